@@ -6,7 +6,7 @@
     python -m docs.pictures.make sky demo     the sky plot of a pass, and the overview of the demo
     python -m docs.pictures.make budget       the error budget, from docs/rows.json
     python -m docs.pictures.make loops        the position loops of an antenna from a data sheet
-    python -m docs.pictures.make targets      the default filter beside tuned filters, on hard targets
+    python -m docs.pictures.make targets      the default filter beside tuned filters, from docs/rows.json
     python -m docs.pictures.make night        the chart of a night of passes
 """
 import argparse
@@ -72,7 +72,7 @@ NIGHT = ('--station', '47.4,8.5,500', '--from', '2019-12-10T00:00', '--horizon',
          'MOLNIYA=0.1', '--window', 'STATIONARY=2019-12-10T12:00/2019-12-10T13:00')
 """Arguments of the plan of the night of docs/operate/plan.md."""
 
-SHOWN_TARGETS, TARGET_RUNS = ('geo', 'leo', 'uav-60m', 'helicopter', 'jet', 's-motion', 'square', 'chirp'), 4
+LOST_RATIO = 5.0  # place of a target that a filter loses, in the chart of the ratios of pointing errors
 
 
 def start(*arguments):
@@ -215,11 +215,35 @@ def make_loops(folder):
     return made('loops')
 
 
+def targets_figure(rows):
+    """Pointing error of the default over that of the tuned filter for each target; beside it the IMM that expects
+    manoeuvres, with a cross at the edge where that IMM loses the target."""
+    figure, panels = figures.new_panels(1, height=6.4, x='pointing error over that of the tuned filter')
+    axes, targets = panels[0, 0], [*target_filters.TARGET_SCENARIOS]
+    for name, label, colour in (('default', 'default', figures.FILTERED_COLOUR),
+                                ('manoeuvre', 'IMM that expects manoeuvres', figures.RAW_COLOUR)):
+        found = [rows['target-filters', f'{target}/{name}', 'pointing_to_tuned'] for target in targets]
+        known = [i for i, row in enumerate(found) if row['value'] is not None]
+        ends = np.array([[found[i][end] for i in known] for end in ('ci_low', 'value', 'ci_high')])
+        axes.errorbar(ends[1], known, xerr=np.diff(ends, axis=0), fmt='o', markersize=4, color=colour, label=label)
+        lost = [i for i in range(len(targets)) if i not in known]
+        axes.plot([LOST_RATIO] * len(lost), lost, 'x', color=colour)
+    axes.axvline(1.0, linewidth=0.8)
+    axes.axvline(target_filters.MAX_POINTING_RATIO, linewidth=0.8, linestyle='--', label='requirement')
+    axes.set_xscale('log')
+    axes.set_xlim(0.75, 1.1 * LOST_RATIO)
+    axes.set_xticks([0.8, 1.0, 1.5, 2.0, 3.0, 4.0, LOST_RATIO], ['0.8', '1', '1.5', '2', '3', '4', 'lost'])
+    axes.minorticks_off()
+    axes.set_yticks(range(len(targets)), targets)
+    axes.set_ylim(len(targets) - 0.5, -0.5)
+    axes.legend(loc='lower right')
+    return figure
+
+
 def make_targets(_folder):
-    """Pointing errors of the study target-filters, for targets that accelerate hard and for some that do not."""
-    cases = [f'{target}/{name}' for target in SHOWN_TARGETS for name in ('default', 'tuned', 'manoeuvre')]
-    values = {case: np.array([target_filters.pointing(case, run) for run in range(TARGET_RUNS)]) for case in cases}
-    return make_figure(figures.Spec('target_filters', '', '', (), target_filters.figure), values, 'target_filters')
+    from tools.numbers import published
+    return make_figure(figures.Spec('target_filters', '', '', (), targets_figure), published.read(FOLDER.parents[1]),
+                       'target_filters')
 
 
 def make_night(folder):

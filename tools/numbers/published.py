@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from tools import pages
-from tools.numbers import claims
+from tools.numbers import claims, robustness
 
 import pedestal_studies
 from pedestal import console
@@ -473,11 +473,13 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
     'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
     'controllers': controller_numbers, 'bias schedules': bias_numbers, 'measured loops': loop_numbers,
     'bandwidth with a rate': bandwidth_numbers,
-    'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table}
+    'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table,
+    **robustness.TABLES}
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
-    'bode', 'filters', 'target-filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
+    'bode', 'filters', 'target-filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration', 'structure',
+    'wrong-slope')))
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:

@@ -166,6 +166,15 @@ FLIGHTS = {
                     'passed over 1 x row that repeats time and place')}
 
 
+def test_a_file_is_read_again_after_a_change(tmp_path):
+    track, rows = TrackFileParameters(path=str(tmp_path / 'a.csv')), 'time [s],azimuth [deg],elevation [deg]\n0,1,20\n'
+    (tmp_path / 'a.csv').write_text(rows + '1,2,20\n2,3,20\n3,4,20\n')
+    _, first = track_files.read(track)
+    assert track_files.read(track)[1] is first
+    (tmp_path / 'a.csv').write_text(rows + '1,2,20\n2,3,20\n3,15,20\n')
+    assert track_files.read(track)[1] is not first
+
+
 @pytest.mark.parametrize('name', FLIGHTS)
 def test_a_flight_is_read_by_names_and_units(name, tmp_path):
     text, described = FLIGHTS[name]

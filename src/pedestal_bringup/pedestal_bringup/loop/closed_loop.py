@@ -4,6 +4,7 @@ In step k the drive moves to its time t_k by the commands of step k - 1 and publ
 receiver and control unit answer in this order. A run equals a lockstep recording of the scenario to the last bit. Each
 beam of an array is a loop of its own. These loops have equal ship, INS and time, and do not act on each other.
 """
+import copy
 import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
@@ -180,6 +181,7 @@ class Loop:
     {node: parameters} that replace those of the scenario."""
     units: dict[str, Unit]
     steps: int                  # number of steps of the run
+    made: int = 0               # number of steps made
 
     def __init__(self, scenario: Scenario, beam: str = '', changed: Mapping[str, Parameters] | None = None) -> None:
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
@@ -196,6 +198,17 @@ class Loop:
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
         self.steps = round(scenario.header.duration / period) + 1
+        self._before = records.empty(STEP_DTYPE, 1)
+
+    def copy(self) -> 'Loop':
+        """Return a loop that continues from the present state by itself. Both share their constant data."""
+        known: dict[int, object] = {id(self.tracks): self.tracks}
+        for unit in self.units.values():
+            record, *constant = unit.memory
+            known |= {id(part): part for part in (unit.parameters, unit.messages, *constant)}
+            # numpy would copy a record field by field, in three times the time.
+            known[id(record)] = record.view(np.uint8).copy().view(record.dtype)
+        return copy.deepcopy(self, known)
 
     def before_step(self, first: int, forecasts: list[Forecast]) -> None:
         """Execute the scheduled commands that are due. At each whole second, add to `forecasts`."""
@@ -214,26 +227,28 @@ class Loop:
         step_not_before_due = -(-due // self.period_ns)
         return min(step_not_before_due, self.steps)
 
-    def run(self, injected: Pairs | None = None, watch: Callable[[int], int] | None = None) -> Run:
-        """Make every step of the scenario and return the Run. Call this method only once.
+    def run(self, injected: Pairs | None = None, watch: Callable[[int], int] | None = None,
+            last: int | None = None) -> Run:
+        """Make every step up to step number `last`, by default all of the scenario, and return the Run of these steps.
 
-        watch(number of steps made) is called between blocks of steps and may read or command the units. It returns the
-        largest number of steps until its next call.
+        injected: as of `loop`, None for none. watch(number of steps made) is called between blocks of steps and may
+        read or command the units. It returns the largest number of steps until its next call; 0 ends the run.
         """
+        begun, end = self.made, self.steps if last is None else last
         if injected is None:
-            injected = np.zeros((self.steps, 2))
-        steps, truth = records.empty(STEP_DTYPE, self.steps), Truth.zeros(self.steps)
-        before = records.empty(STEP_DTYPE, 1)
+            injected = np.zeros((end - begun, 2))
+        steps, truth = records.empty(STEP_DTYPE, end - begun), Truth.zeros(end - begun)
         forecasts: list[Forecast] = []
-        first = 0
-        while first < self.steps:
+        while (first := self.made) < end:
             self.before_step(first, forecasts)
-            last = min(first + (watch(first) if watch else MAX_BLOCK_STEPS), first + MAX_BLOCK_STEPS,
-                       self.next_event_step(first))
-            part = slice(first, last)
-            memories = tuple(self.units[name].block(last - first) if name in self.units else None
+            block = watch(first) if watch else MAX_BLOCK_STEPS
+            if not block:
+                break
+            self.made = min(first + min(block, MAX_BLOCK_STEPS), self.next_event_step(first), end)
+            part = slice(first - begun, self.made - begun)
+            memories = tuple(self.units[name].block(self.made - first) if name in self.units else None
                              for name in UNIT_ORDER)
-            loop(memories, first, self.period_ns, before, injected[part], steps[part], truth[part])
-            first = last
-        return Run(steps, truth, np.arange(self.steps) * self.period_ns, self.units, forecasts,
+            loop(memories, first, self.period_ns, self._before, injected[part], steps[part], truth[part])
+        made = slice(self.made - begun)
+        return Run(steps[made], truth[made], np.arange(begun, self.made) * self.period_ns, self.units, forecasts,
                    self.replies, self.tracks)

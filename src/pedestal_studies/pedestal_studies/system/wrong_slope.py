@@ -1,22 +1,27 @@
 """Wrong slopes of the receiver in autotrack: time of the alarm, false alarms, and the bound of all such tests.
 
-A case is <target>/<slope>. At a random time of autotrack the errors of the receiver get a wrong factor, get turned
-axes, or get the wrong sign on one axis. In the case `right` they stay right. The targets are those of the study
-target-filters, and all other scenarios that track a moving target.
+A case is <target>/<slope>, or all/<slope> for all targets. At a random time of autotrack, copies of the run get errors
+with a wrong factor, with turned axes, or with the wrong sign on one axis. In the case `right` the errors stay right.
+The targets are those of the study target-filters, all other scenarios that track a moving target, and a satellite that
+the operator did not declare (`keeps_program`).
 
-alarm_steps               steps from the onset to the alarm `diverged`, over the runs with the alarm
-in_time_percent           share of the runs with the alarm within 200 steps
-known_in_time_percent     share of the runs in which a test that knows the target could give the alarm in this time
-largest_error_beamwidths  largest pointing error until the alarm, or until the end of the run
+in_time_percent           share of the runs with the alarm `diverged` within 200 steps from the onset
+alarm_steps_median        steps from the onset to the alarm, if more than half of the runs have it
+known_in_time_percent, known_steps_median   the same of a test that knows the target
+alarm_percent             share of the runs with the alarm within 2 s
+lost_percent              share of the runs whose autotrack ends within 2 s without the alarm
+largest_error_beamwidths  largest pointing error in these 2 s, until autotrack ends
+false_alarms_per_10_h     of `right`: rate of the alarms, with the interval of Garwood (Biometrika 28 (1936) 437)
 
-The last test sums the log-likelihood ratio of the wrong and the right slope from the onset on, with the true direction
-of the target. A limit of ln(n) gives at least n steps to a false alarm on average (Lorden, Annals of Mathematical
-Statistics 42 (1971) 1897). No other test with so few false alarms is faster for long. While the beam is nearer to the
-target than the noise of the receiver, errors of any slope look alike.
+The test that knows the target sums the log-likelihood ratio of the wrong and the right slope from the onset on, with
+the true direction of the target. A limit of ln(n) gives at least n steps to a false alarm on average (Lorden, Annals
+of Mathematical Statistics 42 (1971) 1897). No other test with so few false alarms is faster for long. While the beam
+is nearer to the target than the noise of the receiver, errors of any slope look alike.
 
-The score of a step is J - WRONG_SLOPE_RATIO (J' - EXPLAINED_ROUGHNESS k) of `acu_tracker.estimation.monitors`. The
-alarm has a limit for the score; the figure shows what lower limits would do. For a target that keeps to its program,
-the sum of `acu_tracker.estimation.slope_ratio` has a limit too; largest_sum is its largest value in the case `right`.
+The alarm has two limits: one for the score J - ratio (J' - EXPLAINED_ROUGHNESS k) of
+`acu_tracker.estimation.monitors`, and one for the sum of `acu_tracker.estimation.slope_ratio` of a target that keeps
+to its program. The cases limits/<factor> have all gross slopes of all targets, with both limits times the factor; the
+figure has them for each slope.
 """
 import cmath
 import math
@@ -25,78 +30,92 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import chi2
 
 from acu_tracker.estimation import monitors, slope_ratio
 from acu_tracker.estimation.filters.measurement import error_variance
 from acu_tracker.modes import Mode
-from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.loop.closed_loop import Run
+from pedestal_bringup.loop.closed_loop import Loop, Run
 from pedestal_bringup.scenario.variant import Variant
-from pedestal_common.quantities import AnyRecord, Complexes, Floats, Pairs, Row, Seconds
-from pedestal_results.intervals import row
+from pedestal_common.quantities import Bools, Complexes, Estimate, Floats, Row
+from pedestal_common.wire.commands import Command
+from pedestal_results.intervals import CONFIDENCE_LEVEL, estimated, row
 from pedestal_results.report import figures as fig
 from pedestal_studies.result import FIRST_SEED, Result, legend, of_cases, seeds
 from pedestal_studies.system import target_filters
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
+from pedestal_workbench.trials.statistics import percentile, rate
 
-DEFAULT_RUNS = 20  # runs of each case
+DEFAULT_RUNS = 200  # runs of each case
 
 SCENARIOS = ('leo_station_7m', 'phased_array_sway', 'ship_overhead', 'ship_terminal_1m2', 'ship_uav', 'station_real',
              'uav_tracker_3m')
-TARGETS = (*target_filters.TARGET_SCENARIOS, *SCENARIOS)
+UNDECLARED_SUFFIX = '-undeclared'  # part of the name of a satellite without `keeps_program`
+TARGETS = (*target_filters.TARGET_SCENARIOS, *SCENARIOS, f'leo{UNDECLARED_SUFFIX}', f'leo-ship{UNDECLARED_SUFFIX}')
 
 
 class Slope(NamedTuple):
-    """A slope of the receiver."""
-    inject: str         # text of the injected fault; '' without a fault
+    """A wrong slope of the receiver."""
     factor: complex     # factor of the errors, cross-elevation as real and elevation as imaginary part
+    arguments: dict[str, str]   # of the injected fault wrong_slope
     axis: int = -1      # axis with this factor; -1: both
 
 
 def _of_both(factor: float, turn_deg: float) -> Slope:
     turn = math.radians(turn_deg)
-    return Slope(f'wrong_slope factor={factor:g} turn={turn:.6g}', factor * cmath.exp(1j * turn))
+    return Slope(factor * cmath.exp(1j * turn), {'factor': f'{factor:g}', 'turn': f'{turn:.6g}'})
 
 
-SLOPES = {'right': Slope('', 1.0), **{f'factor-{f:g}': _of_both(f, 0.0) for f in (0.3, 0.5, 2.0, 3.0)},
-          **{f'turn-{turn}': _of_both(1.0, turn) for turn in (45, 90, 120, 150)},
-          'phase-180': Slope('phase_180', -1.0),
-          'sign-cross-elevation': Slope('wrong_slope axis=cross_elevation', -1.0, 0),
-          'sign-elevation': Slope('wrong_slope axis=elevation', -1.0, 1)}
+def _name(factor: float, turn_deg: float) -> str:
+    return '-'.join([f'factor-{factor:g}'] * (factor != 1.0) + [f'turn-{turn_deg:g}'] * (turn_deg != 0.0))
+
+
+SLOPES = {**{_name(factor, turn): _of_both(factor, turn) for factor, turn in (
+              (0.3, 0.0), (3.0, 0.0), (1.0, 45.0), (1.0, 90.0), (1.0, 135.0), (1.0, 180.0), (0.3, 180.0),
+              (3.0, 180.0))},
+          'sign-cross-elevation': Slope(-1.0, {'axis': 'cross_elevation'}, 0),
+          'sign-elevation': Slope(-1.0, {'axis': 'elevation'}, 1)}
 GROSS_SLOPES = tuple(name for name, slope in SLOPES.items() if slope.factor.real < 1e-9)
-"""Slopes that drive the beam away from the target. The loop holds its target with all others."""
+"""Slopes that drive the beam away from the target."""
+RIGHT = 'right'  # name of the case without a wrong slope
 
-EARLIEST_ONSET_S, LATEST_ONSET_S, RUN_AFTER_ONSET_S = 6.0, 16.0, 4.0
-RIGHT_DURATION_S = 60.0  # of a run without a fault
+EARLIEST_ONSET_S, LATEST_ONSET_S, RUN_AFTER_ONSET_S = 6.0, 20.0, 2.0
+LONG_RUN_S, LONG_RUN_SPACING = 60.0, 8  # duration of every eighth run of the case `right`; others end at the onset
+DURATIONS_S = {'phased_array_sway': 20.0}  # of scenarios that are shorter
 MAX_ALARM_STEPS = 200  # latest alarm, in steps after the onset
 FALSE_ALARM_FREE_STEPS = 10 * 3600 * 200  # 10 h
-MARGINS = (0.0, 0.5, 1.0, 1.5, monitors.WRONG_SLOPE_MARGIN)  # limits of the score; the last one is that of the alarm
-COARSE_STEPS, FINE_STEPS = 20, monitors.BLOCK_ERROR_COUNT  # steps between two scores before and after the onset
+LIMIT_FACTORS = (0.25, 0.5, 0.75, 1.0)  # of both limits; the last one is that of the alarm
+COARSE_STEPS, FINE_STEPS = 20, monitors.BLOCK_ERROR_COUNT  # steps between two looks at a right and at a gross slope
+COLUMN_COUNT = len(LIMIT_FACTORS) + 3  # numbers of a run of one case
 
 
-def variant(target: str, slope: str, seed: int, onset: Seconds) -> Variant:
-    """Return the variant of a run."""
-    chosen = (Variant(target, seed=seed) if target in SCENARIOS
-              else target_filters.placed(f'{target}/default', seed))
-    most = chosen.load().header.duration
-    if not SLOPES[slope].inject:
-        return chosen.with_(duration=min(RIGHT_DURATION_S, most))
-    return chosen.with_({'tracking_receiver.inject': f'{onset:g} {SLOPES[slope].inject}'},
-                        duration=onset + RUN_AFTER_ONSET_S)
+def variant(target: str, seed: int) -> Variant:
+    """Return the variant of a run, at most of LONG_RUN_S."""
+    name = target.removesuffix(UNDECLARED_SUFFIX)
+    if name in SCENARIOS:
+        return Variant(name, seed=seed, duration=DURATIONS_S.get(name, LONG_RUN_S))
+    chosen = target_filters.placed(f'{name}/default', seed).with_(duration=LONG_RUN_S)
+    return chosen if name == target else chosen.with_({'acu.tracker.keeps_program': False})
 
 
-def score(state: AnyRecord) -> float:
-    """Return the score of a WrongSlope, 0 before its first verdict."""
-    if state['n'] < monitors.MIN_BLOCK_COUNT:
-        return 0.0
-    return max(monitors.score(state, hypothesis, monitors.WRONG_SLOPE_RATIO) for hypothesis in range(3))
+def reached(loop: Loop) -> tuple[float, float]:
+    """Return the score and the sum of a loop, each divided by its limit; 0 before the first verdict."""
+    acu = loop.units['acu']
+    tracking, beamwidth = acu.parts['state']['tracking'], acu.parameters.tracker.receiver.beamwidth
+    curves, sums = tracking['wrong_slope'], tracking['slope_ratio']
+    scored, summed = curves['n'] >= monitors.MIN_BLOCK_COUNT, sums['n'] >= slope_ratio.MIN_BLOCK_COUNT
+    ratio = monitors.permitted_ratio(curves, monitors.leaving_error(tracking['divergence'], beamwidth))
+    score = max(monitors.score(curves, hypothesis, ratio) for hypothesis in range(3)) if scored else 0.0
+    largest = (sums['S'] - slope_ratio.MISFIT_WEIGHT * np.maximum(sums['X'], 0.0)).max() if summed else 0.0
+    return score / monitors.WRONG_SLOPE_MARGIN, float(largest) / slope_ratio.MAX_S
 
 
-def ratio(state: AnyRecord) -> float:
-    """Return the largest sum of a SlopeRatio less its deductions, 0 without a program."""
-    if state['n'] < slope_ratio.MIN_BLOCK_COUNT:
-        return 0.0
-    return float((state['S'] - slope_ratio.MISFIT_WEIGHT * np.maximum(state['X'], 0.0)).max())
+def _told(loop: Loop) -> bool:
+    return bool(loop.units['acu'].parts['state']['tracking']['divergence']['diverged'])
+
+
+def _tracks(loop: Loop) -> bool:
+    return bool(loop.units['acu'].parts['state']['mode']['now'] == Mode.AUTOTRACK)
 
 
 def known_steps(true: Complexes, variance: Floats, factor: complex) -> float:
@@ -110,94 +129,156 @@ def known_steps(true: Complexes, variance: Floats, factor: complex) -> float:
     return after + 1.0 if after < len(evidence) else math.nan
 
 
-def _known_steps(run: Run, slope: Slope, first: int) -> float:
-    """Return known_steps from step `first` of a run on."""
+def _known_steps(run: Run, slope: Slope) -> float:
+    """Return known_steps of a run from the onset on."""
     receiver = run.units['acu'].parts['constants']['p']['tracker']['receiver']
     variance = np.array([error_variance(x, e, cn0_dbhz, receiver)
-                         for x, e, cn0_dbhz in run['tracking_receiver/angle_error']['vector'][first:]])
-    true = run.truth['error'][first:]
+                         for x, e, cn0_dbhz in run['tracking_receiver/angle_error']['vector']])
+    true = run.truth['error']
     return known_steps(true @ (1.0, 1.0j) if slope.axis < 0 else true[:, slope.axis].astype(complex), variance,
                        slope.factor)
 
 
-def measured(name: str, number: int) -> Floats:
-    """Return of one run: steps from the onset until the score is above each of MARGINS, hours of autotrack,
-    known_steps, largest error [beamwidths], largest score and largest sum of slope_ratio without a fault."""
-    target, _, slope = name.partition('/')
-    seed = FIRST_SEED + number
-    onset = round(float(np.random.default_rng(seed).uniform(EARLIEST_ONSET_S, LATEST_ONSET_S)), 2)
-    loop = closed_loop.Loop(variant(target, slope, seed, onset).load())
-    first = math.ceil(onset * 1e9 / loop.period_ns) if SLOPES[slope].inject else loop.steps
-    acu = loop.units['acu']
-    state = acu.parts['state']['tracking']
-    steps, quiet = np.full(len(MARGINS), np.nan), [(0.0, 0.0)]
+def _largest_error(run: Run) -> float:
+    """Return the largest pointing error of a run [beamwidths], NaN without an error."""
+    off = np.hypot(*run.truth['error'].T) / run.units['acu'].parameters.tracker.receiver.beamwidth
+    return float(np.nanmax(off, initial=-math.inf))
+
+
+def _quiet(loop: Loop, last: int) -> Floats:
+    """Track with the right slope up to step number `last` or an alarm. Return 1 for the alarm or 0, hours of
+    autotrack, and the largest of both numbers of `reached`."""
+    most = np.zeros(2)
 
     def watch(made: int) -> int:
-        now = score(state['wrong_slope'])
-        if made <= first:
-            quiet.append((now, ratio(state['slope_ratio'])))
-            return min(COARSE_STEPS, first - made) or FINE_STEPS
-        if state['divergence']['diverged']:
-            now = math.inf
-        steps[np.isnan(steps) & (now > np.array(MARGINS))] = made - first
-        return FINE_STEPS
-    run = loop.run(watch=watch)
-    if state['divergence']['diverged'] and first == loop.steps:
-        steps[:] = 0.0
-    begun = int(np.argmax(run['acu/mode'] == Mode.AUTOTRACK)) + MAX_ALARM_STEPS
-    judged = slice(begun, None) if first == loop.steps else slice(first, None if np.isnan(steps[-1])
-                                                                  else first + int(steps[-1]))
-    off = np.hypot(*run.truth['error'][judged].T) / acu.parameters.tracker.receiver.beamwidth
-    known = _known_steps(run, SLOPES[slope], first) if first < loop.steps else math.nan
-    hours = (run['acu/mode'] == Mode.AUTOTRACK).sum() * loop.period_ns / 3.6e12
-    return np.array([*steps, hours, known, np.nanmax(off), *np.max(quiet, axis=0)])
+        np.maximum(most, reached(loop), out=most)
+        return 0 if _told(loop) else COARSE_STEPS
+    on = loop.run(watch=watch, last=last)['acu/mode'] == Mode.AUTOTRACK
+    return np.array([_told(loop), on.sum() * loop.period_ns / 3.6e12, *most])
 
 
-def rows(values: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of the study; values: {case: as `measured` returns, of every run}."""
-    table = []
-    for slope in SLOPES:
-        of_slope = {name: of_runs for name, of_runs in values.items() if name.endswith(f'/{slope}')}
-        if of_slope:
-            table += _rows(f'all/{slope}', np.concatenate(list(of_slope.values())))
-        if slope == 'phase-180':
-            for name, of_runs in of_slope.items():
-                table += _rows(name, of_runs)
+def _after_onset(loop: Loop, name: str) -> Floats:
+    """Give the receiver of a loop a wrong slope. Return steps from the onset until each of LIMIT_FACTORS is reached,
+    known_steps, the largest error, and 1 if autotrack ends without the alarm, else 0."""
+    loop.units['tracking_receiver'].command(Command('wrong_slope', arguments=SLOPES[name].arguments))
+    onset, steps = loop.made, np.full(len(LIMIT_FACTORS), np.nan)
+    spacing = FINE_STEPS if name in GROSS_SLOPES else COARSE_STEPS
+
+    def watch(made: int) -> int:
+        share = math.inf if _told(loop) else min(max(reached(loop)), LIMIT_FACTORS[-1])
+        steps[np.isnan(steps) & (share > np.array(LIMIT_FACTORS))] = made - onset
+        return spacing if _tracks(loop) and not _told(loop) else 0
+    run = loop.run(watch=watch, last=onset + round(RUN_AFTER_ONSET_S * 1e9 / loop.period_ns))
+    watch(loop.made)
+    return np.array([*steps, _known_steps(run, SLOPES[name]), _largest_error(run), not (_tracks(loop) or _told(loop))])
+
+
+def measured(target: str, number: int) -> Floats:
+    """Return the numbers of a run (cases, COLUMN_COUNT): of the right slope as `_quiet` returns them, then of each of
+    SLOPES as `_after_onset` does. They are NaN if the antenna does not track at the onset."""
+    seed = FIRST_SEED + number
+    loop = Loop(variant(target, seed).load())
+    latest = min(LATEST_ONSET_S, loop.steps * loop.period_ns * 1e-9 - RUN_AFTER_ONSET_S)
+    onset = math.ceil(np.random.default_rng(seed).uniform(EARLIEST_ONSET_S, latest) * 1e9 / loop.period_ns)
+    table = np.full((1 + len(SLOPES), COLUMN_COUNT), np.nan)
+    quiet = _quiet(loop, onset)
+    if _tracks(loop) and not _told(loop):
+        for line, name in zip(table[1:], SLOPES):
+            line[:] = _after_onset(loop.copy(), name)
+        if number % LONG_RUN_SPACING == 0:
+            later = _quiet(loop, loop.steps)
+            quiet = np.array([later[0], quiet[1] + later[1], *np.maximum(quiet[2:], later[2:])])
+    table[0, :len(quiet)] = quiet
     return table
 
 
-def _rows(case: str, of_runs: Pairs) -> list[Row]:
-    steps, known, error = of_runs[:, len(MARGINS) - 1], of_runs[:, -4], of_runs[:, -3]
-    told, slope = np.isfinite(steps), case.partition('/')[2]
-    gross = slope in GROSS_SLOPES
-    table = [row(case, 'alarm_percent', 100.0 * told, '%', target=None if gross else '<= 0'),
-             row(case, 'largest_error_beamwidths', error, 'beamwidths', target='<= 0.5')]
+def rows(values: Mapping[str, Floats]) -> list[Row]:
+    """Return the rows of the study; values: {target: as `measured` returns, of every run}."""
+    of_all = {'all': np.concatenate(list(values.values())), **values}
+    table = _limit_rows(of_all['all'])
+    for target, of_runs in of_all.items():
+        table += _right_rows(f'{target}/{RIGHT}', of_runs[:, 0])
+        for k, slope in enumerate(SLOPES, 1):
+            table += _slope_rows(f'{target}/{slope}', slope in GROSS_SLOPES, of_runs[:, k])
+    return table
+
+
+def alarm_rate(count: int, hours: float) -> Estimate:
+    """Return the alarms per 10 h of `count` alarms in some hours, with the exact interval of a Poisson process."""
+    tail = 0.5 * (1.0 - CONFIDENCE_LEVEL)
+    low = 0.5 * float(chi2.ppf(tail, 2 * count)) if count else 0.0
+    return 10.0 * count / hours, 10.0 * low / hours, 5.0 * float(chi2.isf(tail, 2 * count + 2)) / hours
+
+
+def _false_alarms(of_right: Floats) -> list[Estimate]:
+    """Return the false alarms per 10 h with the limits times each of LIMIT_FACTORS."""
+    told, hours, *most = of_right[:, :4].T
+    share = np.where(told > 0.0, math.inf, np.minimum(np.max(most, axis=0), LIMIT_FACTORS[-1]))
+    return [alarm_rate(int((share > factor).sum()), float(hours.sum())) for factor in LIMIT_FACTORS]
+
+
+def _limit_rows(of_all: Floats) -> list[Row]:
+    """Return the rows of LIMIT_FACTORS, over all targets and gross slopes."""
+    gross = of_all[:, [k for k, name in enumerate(SLOPES, 1) if name in GROSS_SLOPES]].reshape(-1, COLUMN_COUNT)
+    steps = gross[np.isfinite(gross[:, -1]), :len(LIMIT_FACTORS)]
+    return [line for factor, false, told in zip(LIMIT_FACTORS, _false_alarms(of_all[:, 0]), steps.T) for line in (
+        estimated(f'limits/{factor:g}', 'false_alarms_per_10_h', false, '', len(of_all)),
+        _share(f'limits/{factor:g}', 'in_time_percent', told <= MAX_ALARM_STEPS))]
+
+
+def _right_rows(case: str, of_runs: Floats) -> list[Row]:
+    told, hours, score, total = of_runs[:, :4].T
+    runs = len(of_runs)
+    return [row(case, 'false_alarms', int(told.sum()), target='<= 0'), row(case, 'hours', hours.sum(), 'h'),
+            estimated(case, 'false_alarms_per_10_h', alarm_rate(int(told.sum()), hours.sum()), '', runs),
+            row(case, 'largest_score', score.max() * monitors.WRONG_SLOPE_MARGIN,
+                target=f'<= {monitors.WRONG_SLOPE_MARGIN:g}'),
+            row(case, 'largest_sum', total.max() * slope_ratio.MAX_S, target=f'<= {slope_ratio.MAX_S:g}')]
+
+
+def _share(case: str, metric: str, met: Floats | Bools) -> Row:
+    return estimated(case, metric, rate(int(met.sum()), len(met)), '%', len(met))
+
+
+def _median(case: str, metric: str, steps: Floats) -> list[Row]:
+    """Return the Row of the median of steps, which are NaN for never; no Row if half of them are."""
+    if 2 * np.isfinite(steps).sum() <= len(steps) + 1:
+        return []
+    ordered = np.where(np.isfinite(steps), steps, math.inf)
+    return [estimated(case, metric, percentile(ordered, 50.0), 'steps', len(steps))]
+
+
+def _slope_rows(case: str, gross: bool, of_runs: Floats) -> list[Row]:
+    of_runs = of_runs[np.isfinite(of_runs[:, -1])]
+    if not len(of_runs):
+        return []
+    steps, (known, error, lost) = of_runs[:, len(LIMIT_FACTORS) - 1], of_runs[:, -3:].T
+    known = np.fmin(known, steps)
+    table = [_share(case, 'alarm_percent', np.isfinite(steps)), _share(case, 'lost_percent', lost),
+             row(case, 'largest_error_beamwidths', error, 'beamwidths')]
     if gross:
-        table += [row(case, 'in_time_percent', 100.0 * (steps <= MAX_ALARM_STEPS), '%'),
-                  row(case, 'known_in_time_percent', 100.0 * (np.fmin(known, steps) <= MAX_ALARM_STEPS), '%')]
-        if told.any():
-            table.append(row(case, 'alarm_steps', steps[told], 'steps'))
-    if slope == 'right':
-        table += [row(case, 'hours', float(of_runs[:, -5].sum()), 'h'),
-                  row(case, 'largest_score', float(of_runs[:, -2].max()),
-                      target=f'<= {monitors.WRONG_SLOPE_MARGIN:g}'),
-                  row(case, 'largest_sum', float(of_runs[:, -1].max()), target=f'<= {slope_ratio.MAX_S:g}')]
+        table += [_share(case, 'in_time_percent', steps <= MAX_ALARM_STEPS),
+                  _share(case, 'known_in_time_percent', known <= MAX_ALARM_STEPS),
+                  *_median(case, 'alarm_steps_median', steps), *_median(case, 'known_steps_median', known)]
     return table
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = of_cases(measured, [f'{target}/{slope}' for target in TARGETS for slope in SLOPES], runs, pool, progress)
-    return Result(rows(values), {'margins': lambda: figure(values)}, [seeds(runs)])
+    values = of_cases(measured, TARGETS, runs, pool, progress)
+    table = rows(values)
+    return Result(table, {'limits': lambda: figure(values)}, [seeds(runs)],
+                  [line for line in table if line['case'].startswith(('all/', 'limits/'))])
 
 
-def figure(values: Mapping[str, Pairs]) -> Figure:
-    """Draw the alarms in time and the runs with a false alarm over the limit of the score."""
-    drawn, axes = fig.new_panels(1, height=3.8, x='limit of the score', y='share of the runs [%]')
-    for slope in GROSS_SLOPES:
-        steps = np.concatenate([of_runs[:, :len(MARGINS)] for name, of_runs in values.items()
-                                if name.endswith(f'/{slope}')])
-        axes[0, 0].plot(MARGINS, 100.0 * (steps <= MAX_ALARM_STEPS).mean(axis=0), 'o-', label=f'in time: {slope}')
-    quiet = np.concatenate([of_runs[:, -2] for name, of_runs in values.items() if name.endswith('/right')])
-    axes[0, 0].plot(MARGINS, [100.0 * (quiet > margin).mean() for margin in MARGINS], 'k--', label='false alarm')
+def figure(values: Mapping[str, Floats]) -> Figure:
+    """Draw the alarms in time over the false alarms, for each of LIMIT_FACTORS and each gross slope."""
+    drawn, axes = fig.new_panels(1, height=4.2, x='false alarms in 10 h of a right slope', y='alarms in time [%]')
+    of_all = np.concatenate(list(values.values()))
+    false = [value for value, *_ in _false_alarms(of_all[:, 0])]
+    axes[0, 0].set_xscale('symlog')
+    for k, slope in enumerate(SLOPES, 1):
+        if slope in GROSS_SLOPES:
+            steps = of_all[np.isfinite(of_all[:, k, -1]), k, :len(LIMIT_FACTORS)]
+            axes[0, 0].plot(false, 100.0 * (steps <= MAX_ALARM_STEPS).mean(axis=0), 'o-', label=slope)
     return legend(drawn)

@@ -2,6 +2,8 @@
 
 The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
 """
+import functools
+import os
 import re
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple, TypeAlias
@@ -89,7 +91,16 @@ DERIVED_PARAMETERS = (*flight.STATION_FIELDS, 'receiver.reference_range', 'durat
 
 
 def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
-    """Return (kind, data) of a track file. Raises csv_table.TableError."""
+    """Return (kind, data) of a track file. Raises csv_table.TableError. Because the nodes of a run and all trials of a
+    plan read one file, the last file is kept until it changes."""
+    try:
+        found = os.stat(track.path)
+    except (OSError, ValueError):   # `_read` names the reason
+        return _read(track)
+    return _kept(track, (found.st_ino, found.st_size, found.st_mtime_ns))
+
+
+def _read(track: TrackFileParameters) -> tuple[FileKind, Data]:
     if not track.path:
         raise csv_table.TableError('track_file.path is empty: give --param '
                                    'tracking_receiver.target.track_file.path=FILE, a file of one of the formats '
@@ -101,6 +112,12 @@ def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
             raise csv_table.TableError(f'{track.path}: {name}')
     form = next(form for form in FILE_FORMATS if form.matches(beginning))
     return form.kind, form.read(track)
+
+
+@functools.lru_cache(maxsize=1)
+def _kept(track: TrackFileParameters, _state: tuple[int, int, int]) -> tuple[FileKind, Data]:
+    """Return `_read` of a file in a state: number, size and time of its last change."""
+    return _read(track)
 
 
 def lay_out(target: TargetParameters, duration: Seconds, margin: Seconds) -> flight.Flight:
