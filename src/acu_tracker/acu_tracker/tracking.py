@@ -139,14 +139,18 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 @compiled
 def departure(tracking: Tracking, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Radians:
     """Return how far the estimate has departed from the program since the last accepted measurement, 0 without a
-    program at one of the two times."""
+    program at one of the two times. A program that was further off than MAX_DEPARTURE_BEAMWIDTHS before, such as the
+    plan of an aircraft that flies another way, is no reference: 0."""
     before = tracking.target.stamp
     if program_track.status(program, t) != Reason.NONE or program_track.status(program, before) != Reason.NONE:
         return 0.0
     u, v = sight(tracking, constants, t).u, sight(tracking, constants, before).u
     p, q = (line_of_sight(program_track.motion_at(program, t)).u,
             line_of_sight(program_track.motion_at(program, before)).u)
-    x, y, z = u.x - p.x - v.x + q.x, u.y - p.y - v.y + q.y, u.z - p.z - v.z + q.z
+    x, y, z = v.x - q.x, v.y - q.y, v.z - q.z
+    if math.sqrt(x * x + y * y + z * z) > MAX_DEPARTURE_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth:
+        return 0.0
+    x, y, z = u.x - p.x - x, u.y - p.y - y, u.z - p.z - z
     return math.sqrt(x * x + y * y + z * z)
 
 

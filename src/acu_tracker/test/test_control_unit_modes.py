@@ -72,14 +72,14 @@ def test_handover_and_back_are_smooth(Rig):
     assert np.abs(rows[100:, 2:]).max() < 5e-5
 
 
-@pytest.mark.parametrize('departs', [True, False])
-def test_a_coast_that_departs_from_the_program_ends_at_two_beamwidths(Rig, departs):
-    """The filter coasts straight on. The program turns by 6 deg/s as the signal is lost, or goes straight on too."""
-    rate = 0.1 if departs else 0.0
+@pytest.mark.parametrize('turn, ends', [(4.0, True), (2.0, False), (math.inf, False)])
+def test_a_coast_that_departs_from_the_program_ends_at_two_beamwidths(Rig, turn, ends):
+    """The filter coasts straight on. The program turns by 6 deg/s as the signal is lost, 2 s before, or never. A program
+    that was wrong before the loss is no reference."""
     rig = Rig(Rig.moving, at=(0.5, 0.6), initial_mode='program')
     times = np.arange(0.0, 10.0, 0.1)
     straight = np.array([Rig.moving(t) for t in times])
-    straight[:, 0] += rate * np.maximum(times - 4.0, 0.0)
+    straight[:, 0] += 0.1 * np.maximum(times - turn, 0.0)
     rig.track = ProgramTrack(times, straight)
     rig.run(4.0)
     assert rig.mode == 'autotrack'
@@ -88,7 +88,7 @@ def test_a_coast_that_departs_from_the_program_ends_at_two_beamwidths(Rig, depar
     rig.run(until - 0.05)
     assert rig.mode == 'autotrack' and rig.outputs['coasting'][0] == 1
     rig.run(0.1)
-    assert (rig.mode, rig.reason) == (('program', 'signal lost') if departs else ('autotrack', 'locked'))
+    assert (rig.mode, rig.reason) == (('program', 'signal lost') if ends else ('autotrack', 'locked'))
 
 
 def test_a_known_latency_is_no_loss(Rig):
