@@ -74,8 +74,8 @@ def test_handover_and_back_are_smooth(Rig):
 
 @pytest.mark.parametrize('turn, ends', [(4.0, True), (2.0, False), (math.inf, False)])
 def test_a_coast_that_departs_from_the_program_ends_at_two_beamwidths(Rig, turn, ends):
-    """The filter coasts straight on. The program turns by 6 deg/s as the signal is lost, 2 s before, or never. A program
-    that was wrong before the loss is no reference."""
+    """The filter coasts straight on. The program turns by 6 deg/s as the signal is lost, 2 s before, or never. A
+    program that was wrong before the loss is no reference."""
     rig = Rig(Rig.moving, at=(0.5, 0.6), initial_mode='program')
     times = np.arange(0.0, 10.0, 0.1)
     straight = np.array([Rig.moving(t) for t in times])
