@@ -23,6 +23,7 @@ from pedestal_workbench.tuning.frequency_response import Response
 
 SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=MAX_SINES, dropped=1, kept=6, peak=0.012)
 SPARE_S = 2.0           # time of the excitation around dropped and kept periods [s]
+TIME_S = SPARE_S + (SWEEP.dropped + SWEEP.kept) * SWEEP.period     # of the whole excitation [s]
 RATE_RAD_S, MIN_PERIODS, QUIET_RATIO = 0.025, 3, 5.0
 """Largest constant rate [rad/s], at which a bad tooth meets few of the periods. Least number of used periods, and
 their largest distance from the median of all periods over the least distance [-]."""
@@ -35,8 +36,7 @@ def _sweep(antenna: Antenna, arguments: Arguments) -> tuple[Sweep, RadiansPerSec
     """Return the multisine of an exercise, and the constant rate [rad/s]."""
     axis, drive = servo.plan(antenna, arguments), servo.drive_of(antenna, str(arguments['axis']))
     limits = getattr(antenna.acu, axis.name).limits
-    time = SPARE_S + (SWEEP.dropped + SWEEP.kept) * SWEEP.period
-    rate = min(RATE_RAD_S, frequency_response.RATE_SHARE * axis.rate, axis.travel / (time + 2.0))
+    rate = min(RATE_RAD_S, frequency_response.RATE_SHARE * axis.rate, axis.travel / (TIME_S + 2.0))
     sweep = frequency_response.in_contact(drive, SWEEP, antenna.period)
     largest = min(sweep.peak, frequency_response.PEAK_SHARE * rate, MAX_PEAK_RAD_S, MAX_PEAK_SHARE * limits.rate)
     return dataclasses.replace(sweep, peak=largest), rate
@@ -45,12 +45,11 @@ def _sweep(antenna: Antenna, arguments: Arguments) -> tuple[Sweep, RadiansPerSec
 def _exercise(antenna: Antenna, arguments: Arguments) -> Exercise:
     axis = servo.plan(antenna, arguments)
     sweep, rate = _sweep(antenna, arguments)
-    time = SPARE_S + (sweep.dropped + sweep.kept) * sweep.period
-    half = 0.5 * rate * (time + 2.0)
-    excite = (f'excite axis={axis.name} peak={sweep.peak!r} duration={time} period={sweep.period} '
+    half = 0.5 * rate * (TIME_S + 2.0)
+    excite = (f'excite axis={axis.name} peak={sweep.peak!r} duration={TIME_S} period={sweep.period} '
               f'lowest={sweep.lowest} highest={sweep.highest!r} points={sweep.points}')
-    return axis.exercise(servo.BEGIN_S + 2.0 + time, half, rate,
-                         axis.preset(servo.BEGIN_S, -half, rate, 2.0 + time),
+    return axis.exercise(servo.BEGIN_S + 2.0 + TIME_S, half, rate,
+                         axis.preset(servo.BEGIN_S, -half, rate, 2.0 + TIME_S),
                          Action(servo.BEGIN_S + 1.0, 'acu', excite), start=-half)
 
 
@@ -85,7 +84,8 @@ def _signals(performed: Performed, arguments: Arguments) -> tuple[Sweep, Floats,
 def _response(sweep: Sweep, added: Floats, sent: Floats) -> Response:
     """Return the open loop; added (n,): multisine; sent: rate command of whole periods."""
     rows = sent.reshape(-1, len(added))
-    return frequency_response.response(dataclasses.replace(sweep, kept=len(rows)), rows.ravel(), (added - rows).ravel())
+    kept = dataclasses.replace(sweep, kept=len(rows))
+    return frequency_response.response(kept, rows.ravel(), (added - rows).ravel())
 
 
 def _margin(metric: str, performed: Performed, arguments: Arguments) -> Measured:

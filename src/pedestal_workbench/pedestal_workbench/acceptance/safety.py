@@ -208,20 +208,19 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
     return dataclasses.replace(made, alarms=ALARM_NAMES)
 
 
-def _onset(performed: Performed, arguments: Arguments) -> Seconds:
-    """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
+def _onset(performed: Performed, arguments: Arguments) -> tuple[Seconds, Seconds]:
+    """Return the times of the fault and of the recovery. Raises ValueError if the antenna was not in its mode then."""
     begin = performed.begin + performed.times(str(arguments['fault']).partition('.')[2])[-1]
     mode = recordings.modes(performed.recording, np.array([begin - performed.antenna.period]))[0]
     wanted = 'autotrack' if arguments['mode'] == 'autotrack' else 'preset'
     if mode != wanted:
         raise ValueError(f'mode at the fault = {mode}: must be {wanted}')
-    return begin
+    return begin, begin + float(arguments['duration']) + RECOVERY_TIME_S
 
 
 def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
     """Return the time from the fault to the first change of a topic of REPORT_TOPICS before the recovery."""
-    begin, recording = _onset(performed, arguments), performed.recording
-    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    (begin, end), recording = _onset(performed, arguments), performed.recording
     times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
                                     if topic in recording.topics]))
     return first(performed, begin - performed.begin, times, times < end)
@@ -229,8 +228,7 @@ def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
 
 def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
     """Return the largest error from the fault until the mode is left, or until the recovery."""
-    begin, run = _onset(performed, arguments), RecordedRun(performed.recording).evaluated
-    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    (begin, end), run = _onset(performed, arguments), RecordedRun(performed.recording).evaluated
     towards = arguments['mode'] == 'autotrack'
     left = run.t[(run.t > begin) & ~np.isin(run.mode, TARGET_MODES if towards else ('preset',))]
     during = (run.t >= begin) & (run.t < min([end, *left]))
