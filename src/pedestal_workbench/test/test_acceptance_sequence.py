@@ -91,7 +91,7 @@ def test_a_stopped_sequence_continues_with_the_first_requirement_without_a_resul
     assert [name for name, _ in performer.made] == ['b-1', 'c-1']
     assert [(kept.name, kept.session) for kept in results] == [('a', 1), ('b', 2), ('c', 2)]
     assert sorted(path.name for path in tmp_path.glob('b-1*')) == ['b-1.interrupted-1', 'b-1.log.interrupted-1']
-    _, (first, second) = sequence.read(tmp_path)
+    _, (first, second), _ = sequence.read(tmp_path)
     assert (first.end, second.end) == ('stopped: an operator commanded stop', 'came to its end')
     assert first.parameters == second.parameters == performer.antenna.sha256
     finished = Noted()

@@ -86,7 +86,7 @@ def _acceptance(options: argparse.Namespace) -> int:
                 code = console.EXIT_ERROR
             except KeyboardInterrupt:
                 code = console.EXIT_STOPPED
-    found = document.Acceptance(spec, *sequence.read(folder), performer.antenna, source, options.command,
+    found = document.Acceptance(spec, *sequence.read(folder)[:2], performer.antenna, source, options.command,
                                 datetime.datetime.now(datetime.timezone.utc))
     print(*document.write(found, folder), sep='\n')
     console.write_json(options.json, document.json_content(found))

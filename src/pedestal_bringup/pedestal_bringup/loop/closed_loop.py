@@ -178,19 +178,20 @@ class Run:
 
 class Loop:
     """Closed loop of a scenario, ready for one run. beam: one of several, such as beam_2; '': the first. changed:
-    {node: parameters} that replace those of the scenario."""
+    {node: parameters} that replace those of the scenario. own_table: see program.Plan."""
     units: dict[str, Unit]
     steps: int                  # number of steps of the run
     made: int = 0               # number of steps made
 
-    def __init__(self, scenario: Scenario, beam: str = '', changed: Mapping[str, Parameters] | None = None) -> None:
+    def __init__(self, scenario: Scenario, beam: str = '', changed: Mapping[str, Parameters] | None = None,
+                 own_table: tuple[Times, Pairs] | None = None) -> None:
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
         self.units = {}
         for name in UNIT_ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
                 self.units[name] = scenario.unit(full, (changed or {}).get(name))
-        self.tracks = {nodes.plain(topic): message for topic, message in Plan(scenario).tracks.items()
+        self.tracks = {nodes.plain(topic): message for topic, message in Plan(scenario, own_table).tracks.items()
                        if topic.startswith(prefix)}
         for topic, message in self.tracks.items():
             self.units['acu'].decode(topic, message)

@@ -24,6 +24,7 @@ MIN_STATED_S = 2.0  # shortest part of a run without a target to be tracked that
 class Plan:
     """Scenario together with its targets and its program tracks, which are built once, at their first use."""
     scenario: Scenario
+    own_table: tuple[Times, Pairs] | None = None    # (times, angles) that the operator sends instead of the predicted
 
     @functools.cached_property
     def targets(self) -> dict[str, target.Target]:
@@ -78,7 +79,8 @@ class Plan:
         """{topic: JointTrajectory} of the program track for every beam; {} without a program track."""
         if self.scenario.header.program.source == 'none':
             return {}
-        return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
+        tables = dict.fromkeys(self.scenario.prefixes, self.own_table) if self.own_table else self.tables
+        return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in tables.items()}
 
     @functools.cached_property
     def ship_summary(self) -> tuple[str, ...]:

@@ -2,10 +2,11 @@
 device or a file of enormous length is refused, because it would block the process or fill its memory."""
 import codecs
 import errno
+import fcntl
 import hashlib
 import os
 import stat
-from typing import BinaryIO, TypeAlias
+from typing import IO, BinaryIO, TypeAlias
 from xml.parsers import expat
 
 FilePath: TypeAlias = str | os.PathLike[str]
@@ -54,6 +55,14 @@ def open_regular(path: FilePath, largest: int | None = None) -> BinaryIO:
     except BaseException:
         os.close(descriptor)
         raise
+
+
+def lock(stream: IO[bytes] | IO[str], user: str) -> None:
+    """Lock an open file until it is closed. Raises ValueError with the words `user` while another process has it."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ValueError(user) from None
 
 
 def read_text(path: FilePath, largest: int) -> str:

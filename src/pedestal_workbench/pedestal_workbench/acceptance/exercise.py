@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from acu_tracker.params import AcuParameters
+from drive_law.axis_params import AxisParameters
 from drive_law.params import AduParameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.topics import AXES
@@ -43,15 +44,19 @@ class Antenna(NamedTuple):
         """{node: its parameters}."""
         return {'acu': self.acu, **({'adu': self.adu} if self.adu else {})}
 
+    def drive(self, axis: str) -> AxisParameters | None:
+        """Return the drive parameters of an axis, None for an antenna without them."""
+        return getattr(self.adu, axis, None)
+
     def travel(self, axis: str) -> tuple[Radians, Radians]:
         """Return the limits of travel of an axis, the tighter ones of control unit and drive."""
-        limits, drive = getattr(self.acu, axis).limits, getattr(self.adu, axis, None)
+        limits, drive = getattr(self.acu, axis).limits, self.drive(axis)
         return ((max(limits.low, drive.limits.lower), min(limits.high, drive.limits.upper)) if drive else
                 (limits.low, limits.high))
 
     def rate(self, axis: str) -> RadiansPerSecond:
         """Return the largest rate of an axis, the lower one of control unit and drive."""
-        rate, drive = getattr(self.acu, axis).shaper.rate, getattr(self.adu, axis, None)
+        rate, drive = getattr(self.acu, axis).shaper.rate, self.drive(axis)
         return float(min(rate, drive.limits.rate) if drive else rate)
 
     @property

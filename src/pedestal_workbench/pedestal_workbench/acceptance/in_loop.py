@@ -7,7 +7,6 @@ from acu_tracker.alarms.table import ALARM_NAMES
 from acu_tracker.unit import Acu
 from pedestal_bringup.loop.closed_loop import Loop
 from pedestal_bringup.loop.memory_recording import MemoryRecording
-from pedestal_bringup.scenario.program import program_message
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import nodes
@@ -47,7 +46,7 @@ def antenna(scenario: Scenario) -> Antenna:
 def run_of(exercise: Exercise, variant: Variant, scenario: Scenario, seed: int = 1) -> Variant:
     """Return the variant whose run makes an exercise, in whole steps: at rest from its start on, with its track, and
     with its actions scheduled beside those of the scenario of the variant. The wind of each seed is another one."""
-    changes: dict[str, Json] = {'scenario.program.source': 'none'} if exercise.track else {}
+    changes: dict[str, Json] = {'scenario.program.source': 'target'} if exercise.track else {}
     if exercise.start is not None:
         changes |= {f'adu.initial_{axis}': angle for axis, angle in zip(AXES, exercise.start)}
         changes |= {'acu.initial_mode': 'stop', 'acu.tracker.handover': False}
@@ -118,10 +117,7 @@ class InLoop(Performer):
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run."""
         scenario = run_of(exercise, self._variant, self._scenario, seed).load(pacing(exercise))
-        loop = Loop(scenario)
-        if exercise.track:
-            loop.tracks['acu/program_track'] = program_message(*exercise.track)
-            loop.units['acu'].decode('acu/program_track', loop.tracks['acu/program_track'])
+        loop = Loop(scenario, own_table=exercise.track)
 
         def watch(made: int) -> int:
             """Stop where the exercise is breached. Return the number of steps to the next call."""

@@ -5,8 +5,8 @@ the signal E of tuning.frequency_response, and the multisine less the command is
 periodic, the correlation of both over a period shows its place in the recording, to the step.
 """
 import dataclasses
+import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 from scipy import signal
@@ -15,15 +15,15 @@ from acu_tracker.servo.excitation import MAX_PEAK_RAD_S, MAX_PEAK_SHARE, MAX_SIN
 from pedestal_common.multisine import Sweep
 from pedestal_common.quantities import Floats, RadiansPerSecond
 from pedestal_recording import recording as recordings
-from pedestal_results.intervals import half_width, pseudo_values
 from pedestal_workbench.acceptance import servo
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import Arguments, Measured, Method, of_parts
 from pedestal_workbench.tuning import frequency_response
 from pedestal_workbench.tuning.frequency_response import Response
 
 SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=MAX_SINES, dropped=1, kept=6, peak=0.012)
 SPARE_S = 2.0           # time of the excitation around dropped and kept periods [s]
+TIME_S = SPARE_S + (SWEEP.dropped + SWEEP.kept) * SWEEP.period     # of the whole excitation [s]
 RATE_RAD_S, MIN_PERIODS, QUIET_RATIO = 0.025, 3, 5.0
 """Largest constant rate [rad/s], at which a bad tooth meets few of the periods. Least number of used periods, and
 their largest distance from the median of all periods over the least distance [-]."""
@@ -36,8 +36,7 @@ def _sweep(antenna: Antenna, arguments: Arguments) -> tuple[Sweep, RadiansPerSec
     """Return the multisine of an exercise, and the constant rate [rad/s]."""
     axis, drive = servo.plan(antenna, arguments), servo.drive_of(antenna, str(arguments['axis']))
     limits = getattr(antenna.acu, axis.name).limits
-    time = SPARE_S + (SWEEP.dropped + SWEEP.kept) * SWEEP.period
-    rate = min(RATE_RAD_S, frequency_response.RATE_SHARE * axis.rate, axis.travel / (time + 2.0))
+    rate = min(RATE_RAD_S, frequency_response.RATE_SHARE * axis.rate, axis.travel / (TIME_S + 2.0))
     sweep = frequency_response.in_contact(drive, SWEEP, antenna.period)
     largest = min(sweep.peak, frequency_response.PEAK_SHARE * rate, MAX_PEAK_RAD_S, MAX_PEAK_SHARE * limits.rate)
     return dataclasses.replace(sweep, peak=largest), rate
@@ -46,18 +45,16 @@ def _sweep(antenna: Antenna, arguments: Arguments) -> tuple[Sweep, RadiansPerSec
 def _exercise(antenna: Antenna, arguments: Arguments) -> Exercise:
     axis = servo.plan(antenna, arguments)
     sweep, rate = _sweep(antenna, arguments)
-    time = SPARE_S + (sweep.dropped + sweep.kept) * sweep.period
-    half = 0.5 * rate * (time + 2.0)
-    excite = (f'excite axis={axis.name} peak={sweep.peak!r} duration={time} period={sweep.period} '
+    half = 0.5 * rate * (TIME_S + 2.0)
+    excite = (f'excite axis={axis.name} peak={sweep.peak!r} duration={TIME_S} period={sweep.period} '
               f'lowest={sweep.lowest} highest={sweep.highest!r} points={sweep.points}')
-    return axis.exercise(servo.BEGIN_S + 2.0 + time, half, rate,
-                         axis.preset(servo.BEGIN_S, -half, rate, 2.0 + time),
+    return axis.exercise(servo.BEGIN_S + 2.0 + TIME_S, half, rate,
+                         axis.preset(servo.BEGIN_S, -half, rate, 2.0 + TIME_S),
                          Action(servo.BEGIN_S + 1.0, 'acu', excite), start=-half)
 
 
 def _signals(performed: Performed, arguments: Arguments) -> tuple[Sweep, Floats, Floats]:
-    """Return (multisine, rate command (periods, n), one period of the multisine (n,)) of the quiet periods. Raises
-    ValueError."""
+    """Return (multisine, one period of it (n,), rate command (periods, n) of the quiet periods). Raises ValueError."""
     sweep, _ = _sweep(performed.antenna, arguments)
     name, bag, n = str(arguments['axis']), performed.recording, round(sweep.period / performed.antenna.period)
     if missing := recordings.missing(bag, 'joint_states', 'acu/rate_command'):
@@ -81,30 +78,27 @@ def _signals(performed: Performed, arguments: Arguments) -> tuple[Sweep, Floats,
     if not found.max() > MIN_CORRELATION:
         raise ValueError(f'the rate command holds no multisine: its correlation is {found.max():.2g}, must be above '
                          f'{MIN_CORRELATION:g}')
-    return dataclasses.replace(sweep, dropped=0, kept=len(quiet)), rows[quiet], np.roll(once, int(np.argmax(found)))
+    return dataclasses.replace(sweep, dropped=0), np.roll(once, int(np.argmax(found))), rows[quiet]
 
 
-def _response(sweep: Sweep, sent: Floats, added: Floats) -> Response:
-    """Return the open loop; sent (periods, n): rate command; added (n,): multisine."""
-    return frequency_response.response(sweep, sent.ravel(), (added - sent).ravel())
+def _response(sweep: Sweep, added: Floats, sent: Floats) -> Response:
+    """Return the open loop; added (n,): multisine; sent: rate command of whole periods."""
+    rows = sent.reshape(-1, len(added))
+    kept = dataclasses.replace(sweep, kept=len(rows))
+    return frequency_response.response(kept, rows.ravel(), (added - rows).ravel())
 
 
-def _measured(performed: Performed, arguments: Arguments, statistic: Callable[[Response], float]) -> Measured:
-    """Return a statistic of the open loop, with the jackknife over the periods, and FRICTION_SHARE."""
-    sweep, sent, added = _signals(performed, arguments)
+def _margin(metric: str, performed: Performed, arguments: Arguments) -> Measured:
+    """Return a metric of the open loop, with the jackknife over the periods, and FRICTION_SHARE."""
+    sweep, added, sent = _signals(performed, arguments)
 
-    def of(rows: list[Floats]) -> float:
-        value = statistic(_response(dataclasses.replace(sweep, kept=len(rows)), np.array(rows), added))
+    def of(kept: Floats) -> float:
+        value = float(frequency_response.margins(_response(sweep, added, kept))[metric][0])
         if not math.isfinite(value):
             raise ValueError(f'the band from {sweep.lowest:g} to {sweep.highest:g} Hz does not show this value')
         return value
-    value, rows = of(list(sent)), list(sent)
-    return Measured(value, math.hypot(half_width(pseudo_values(rows, of)), FRICTION_SHARE * value))
-
-
-def _margin(metric: str) -> Callable[[Performed, Arguments], Measured]:
-    return lambda performed, arguments: _measured(
-        performed, arguments, lambda response: float(frequency_response.margins(response)[metric][0]))
+    found = of_parts(list(sent), of)
+    return found.widened(FRICTION_SHARE * found.value)
 
 
 def _resonance(performed: Performed, arguments: Arguments) -> Measured:
@@ -124,8 +118,8 @@ def _resonance(performed: Performed, arguments: Arguments) -> Measured:
 METHODS = tuple(
     Method(name, f'{doc}, by a multisine at a constant rate', unit, '>=', (servo.AXIS,), _exercise, measure)
     for name, doc, unit, measure in (
-        ('gain_margin', 'gain margin of the position loop', 'dB', _margin('gain_margin_db')),
-        ('phase_margin', 'phase margin of the position loop', 'deg', _margin('phase_margin_deg')),
-        ('bandwidth', 'bandwidth of the position loop', 'Hz', _margin('bandwidth_hz')),
+        ('gain_margin', 'gain margin of the position loop', 'dB', functools.partial(_margin, 'gain_margin_db')),
+        ('phase_margin', 'phase margin of the position loop', 'deg', functools.partial(_margin, 'phase_margin_deg')),
+        ('bandwidth', 'bandwidth of the position loop', 'Hz', functools.partial(_margin, 'bandwidth_hz')),
         ('resonance', 'lowest resonance of the structure on locked motors, a notch in the open loop; without a notch, '
          'the highest frequency, as its lower bound', 'Hz', _resonance)))

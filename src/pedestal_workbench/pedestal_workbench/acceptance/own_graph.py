@@ -11,7 +11,7 @@ from multiprocessing.pool import AsyncResult
 import numpy as np
 
 from pedestal_bringup.graph import graph, pass_recorder
-from pedestal_bringup.scenario.program import Plan, program_message
+from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import domain
 from pedestal_common.graph.modes import MODES
@@ -21,13 +21,13 @@ from pedestal_common.wire import commands
 from pedestal_recording.bag import read
 from pedestal_recording.recording import Decoded, Recording, at, replies
 from pedestal_workbench.acceptance import in_loop
-from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError, Track
+from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, StoppedError, Track
 
 MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a run in realtime [-]
 PRELOADED = __name__,       # modules of the process from which each run is forked
 
 
-class OwnGraph(Performer):
+class OwnGraph(in_loop.InLoop):
     """Performer on the graphs of a variant, as a context. folder: of the recordings.
 
     Each run is a fork of a process that has loaded the modules of all nodes, because a start of Python takes longer
@@ -35,8 +35,8 @@ class OwnGraph(Performer):
     """
 
     def __init__(self, variant: Variant, folder: pathlib.Path) -> None:
-        self._variant, self._folder, self._scenario = variant, folder.resolve(), variant.load()
-        self.antenna = in_loop.antenna(self._scenario)
+        super().__init__(variant)
+        self._folder = folder.resolve()
         self._begun: dict[str, AsyncResult[int]] = {}   # runs that were begun ahead, by name
 
     def __enter__(self) -> 'OwnGraph':
@@ -49,14 +49,6 @@ class OwnGraph(Performer):
         self._pool.terminate()
         self._pool.join()
 
-    def check(self, exercise: Exercise) -> None:
-        """Raise ValueError for an exercise that no run of the variant can make."""
-        self._changed(exercise, 1).load(in_loop.pacing(exercise))
-
-    def _changed(self, exercise: Exercise, seed: int) -> Variant:
-        changed = in_loop.run_of(exercise, self._variant, self._scenario, seed)
-        return changed.with_({'scenario.program.source': 'target'}) if exercise.track else changed
-
     def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
         """Begin the runs in lockstep, as many at a time as this computer has cores."""
         for name, exercise, seed in performances:
@@ -64,8 +56,9 @@ class OwnGraph(Performer):
                 self._begun[name] = self._begin(name, exercise, seed)
 
     def _begin(self, name: str, exercise: Exercise, seed: int) -> AsyncResult[int]:
-        return self._pool.apply_async(_run, (self._changed(exercise, seed), in_loop.pacing(exercise), exercise.track,
-                                             self._folder / name, dict(os.environ)))
+        variant = in_loop.run_of(exercise, self._variant, self._scenario, seed)
+        return self._pool.apply_async(_run, (variant, in_loop.pacing(exercise), exercise.track, self._folder / name,
+                                             dict(os.environ)))
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run. Raises StoppedError."""
@@ -98,10 +91,7 @@ def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, 
     with open(pass_recorder.log_of(bag), 'ab') as log:
         for stream in 1, 2:
             os.dup2(log.fileno(), stream)
-    plan = Plan(variant.load(pacing))
-    if track:
-        vars(plan)['tracks'] = {'acu/program_track': program_message(*track)}
-    return graph.run(plan, bag, contextlib.nullcontext(advance)).losses
+    return graph.run(Plan(variant.load(pacing), track), bag, contextlib.nullcontext(advance)).losses
 
 
 def _trouble(recording: Recording, exercise: Exercise) -> StoppedError | None:

@@ -29,10 +29,10 @@ from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
-from pedestal_workbench.acceptance.servo import encoder_uncertainty, plan
+from pedestal_workbench.acceptance.servo import AXIS, BEGIN_S, encoder_uncertainty, plan
 from pedestal_workbench.acceptance.tracking import TIME_STEPS, first, inside, travel
 
-BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
+REST_TIME_S = 3.0               # time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
 BEYOND_RAD = 0.1                # angle of the refused preset beyond the limit [rad]
 CRUISE_TIME_S = 0.5             # time at the largest rate before a limit or an emergency stop [s]
@@ -70,11 +70,11 @@ def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
     way = min(rate * (0.5 * rise + CRUISE_TIME_S) + braking_distance(rate, deceleration, antenna.acu.reaction),
               0.5 * (high - low))
     start[i] = end - sign * way
-    back = 2.0 * BEGIN_TIME_S + rise + way / rate + REST_TIME_S
+    back = 2.0 * BEGIN_S + rise + way / rate + REST_TIME_S
     finish = back + rise + CRUISE_TIME_S
-    actions = [Action(BEGIN_TIME_S, 'acu', f'preset {axis}={end + sign * BEYOND_RAD:.6f}'),
+    actions = [Action(BEGIN_S, 'acu', f'preset {axis}={end + sign * BEYOND_RAD:.6f}'),
                *(Action(t, 'acu', f'rate {axis}={(sign if t < back else -sign) * rate:.6f}')
-                 for t in np.arange(2.0 * BEGIN_TIME_S, finish, 0.5 * RATE_REQUEST_TIMEOUT_S).tolist()),
+                 for t in np.arange(2.0 * BEGIN_S, finish, 0.5 * RATE_REQUEST_TIMEOUT_S).tolist()),
                Action(finish, 'acu', 'stop')]
     spans = list(travel(antenna))
     spans[i] = spans[i]._replace(low=spans[i].low - LARGEST_OVERSHOOT_DEG, high=spans[i].high + LARGEST_OVERSHOOT_DEG)
@@ -117,7 +117,7 @@ def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
     simulated = arguments['pins'] == 'simulated'
     if simulated and DRIVE_NODE not in antenna.simulated:
         raise ValueError('pins = simulated: must be own, because this antenna has no simulated drive')
-    stow, rest = Action(BEGIN_TIME_S, 'acu', 'stow'), BEGIN_TIME_S + slew + REST_TIME_S
+    stow, rest = Action(BEGIN_S, 'acu', 'stow'), BEGIN_S + slew + REST_TIME_S
     if not simulated and not antenna.acu.stow_pins:
         return Exercise(rest, travel(antenna), (stow,), (start[0], start[1]))
     unstow = rest + antenna.acu.stow_timeout
@@ -165,8 +165,8 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
     if (least := axis.rate * (1.5 * rise + CRUISE_TIME_S)) > axis.travel:
         raise ValueError(f'axis = {axis.name}: {math.degrees(axis.travel):.4g} deg of its travel are too short for '
                          f'its largest rate, must be at least {math.degrees(least):.4g} deg')
-    half, stop = 0.5 * axis.travel, BEGIN_TIME_S + rise + CRUISE_TIME_S
-    actions = (axis.preset(BEGIN_TIME_S, half), Action(stop, DRIVE_NODE, EMERGENCY_STOP),
+    half, stop = 0.5 * axis.travel, BEGIN_S + rise + CRUISE_TIME_S
+    actions = (axis.preset(BEGIN_S, half), Action(stop, DRIVE_NODE, EMERGENCY_STOP),
                Action(stop + REST_TIME_S, DRIVE_NODE, RESET_FAULTS), Action(stop + 2.0 * REST_TIME_S, 'acu', 'stop'))
     made = axis.exercise(stop + 3.0 * REST_TIME_S, half, axis.rate, *actions, start=-half)
     return dataclasses.replace(made, alarms=('emergency stop', f'{axis.name} following error'))
@@ -204,24 +204,23 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
         return Exercise(finish, travel(antenna), tuple(actions), alarms=ALARM_NAMES)
     axis, rate = plan(antenna, {'axis': AXES[0]}), math.radians(RAMP_DEG_S) if mode == 'ramp' else 0.0
     made = axis.exercise(finish, math.radians(ENVELOPE_DEG) + rate * finish, axis.rate,
-                         axis.preset(BEGIN_TIME_S, 0.0, rate, finish), *actions)
+                         axis.preset(BEGIN_S, 0.0, rate, finish), *actions)
     return dataclasses.replace(made, alarms=ALARM_NAMES)
 
 
-def _onset(performed: Performed, arguments: Arguments) -> Seconds:
-    """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
+def _onset(performed: Performed, arguments: Arguments) -> tuple[Seconds, Seconds]:
+    """Return the times of the fault and of the recovery. Raises ValueError if the antenna was not in its mode then."""
     begin = performed.begin + performed.times(str(arguments['fault']).partition('.')[2])[-1]
     mode = recordings.modes(performed.recording, np.array([begin - performed.antenna.period]))[0]
     wanted = 'autotrack' if arguments['mode'] == 'autotrack' else 'preset'
     if mode != wanted:
         raise ValueError(f'mode at the fault = {mode}: must be {wanted}')
-    return begin
+    return begin, begin + float(arguments['duration']) + RECOVERY_TIME_S
 
 
 def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
     """Return the time from the fault to the first change of a topic of REPORT_TOPICS before the recovery."""
-    begin, recording = _onset(performed, arguments), performed.recording
-    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    (begin, end), recording = _onset(performed, arguments), performed.recording
     times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
                                     if topic in recording.topics]))
     return first(performed, begin - performed.begin, times, times < end)
@@ -229,8 +228,7 @@ def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
 
 def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
     """Return the largest error from the fault until the mode is left, or until the recovery."""
-    begin, run = _onset(performed, arguments), RecordedRun(performed.recording).evaluated
-    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    (begin, end), run = _onset(performed, arguments), RecordedRun(performed.recording).evaluated
     towards = arguments['mode'] == 'autotrack'
     left = run.t[(run.t > begin) & ~np.isin(run.mode, TARGET_MODES if towards else ('preset',))]
     during = (run.t >= begin) & (run.t < min([end, *left]))
@@ -243,8 +241,7 @@ def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
     return Measured(float(np.hypot(*known.T).max(initial=0.0)), 0.0)
 
 
-_AXIS = Argument('axis', 'axis that moves', options=AXES, default=AXES[0])
-_LIMIT = (_AXIS, Argument('side', 'end of its travel', options=('low', 'high'), default='high'))
+_LIMIT = (AXIS, Argument('side', 'end of its travel', options=('low', 'high'), default='high'))
 _STOW = (Argument('distance', 'distance of the start from the stow angle, each axis', 0.0, 90.0, 'deg', default=10.0),
          Argument('pins', 'stow pins; own: as the drive has', options=('own', 'simulated'), default='own'))
 _FAULT = (Argument('fault', 'node and fault', options=tuple(FAULTS), default='adu.drop'),
@@ -260,7 +257,7 @@ METHODS = (
     Method('unstow_time', 'as stow_time, then `unstow`: time until the pins are out', 's', '<=', _STOW, _unstow,
            _unstow_time),
     *(Method(f'emergency_stop_{part}', f'request an emergency stop at the largest rate: {part} to standstill', unit,
-             '<=', (_AXIS,), _emergency, functools.partial(_stopping, part))
+             '<=', (AXIS,), _emergency, functools.partial(_stopping, part))
       for part, unit in (('time', 's'), ('angle', 'deg'))),
     Method('fault_report', 'inject a fault: time to the first alarm, or to a change of the mode or of the state of '
            'the drive', 's', '<=', _FAULT, _faulty, _fault_report),

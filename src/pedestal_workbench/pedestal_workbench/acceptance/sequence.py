@@ -6,11 +6,10 @@ interrupted, also by a loss of power, continues there with the first requirement
 import contextlib
 import dataclasses
 import datetime
-import fcntl
 import json
 import math
 import pathlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -20,14 +19,7 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import (
-    BreachError,
-    Exercise,
-    LateError,
-    Performed,
-    Performer,
-    StoppedError,
-)
+from pedestal_workbench.acceptance.exercise import BreachError, Exercise, LateError, Performed, Performer, StoppedError
 from pedestal_workbench.acceptance.judgement import FAILED, Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
@@ -67,7 +59,8 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
     before anything moves for the folder of another specification, StoppedError if the antenna was stopped.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with _locked(folder):
+    with open(folder / LOCK_FILE, 'w') as stream:
+        files.lock(stream, f'{folder}: another acceptance is using this folder')
         results = _Results(folder, specification, performer.antenna.sha256)
         for kept in results.kept:
             report(kept)
@@ -94,12 +87,6 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
             results.end(f'stopped: {str(error) or "by an operator"}')
             raise
     return results.kept
-
-
-def read(folder: pathlib.Path) -> tuple[list[Kept], list[Session]]:
-    """Return the results in a folder, and the runs of the sequence with it. Raises ValueError."""
-    _, sessions, kept = _read(folder / RESULTS_FILE)
-    return kept, sessions
 
 
 def _planned(left: Sequence[tuple[Requirement, Exercise]], seed: int) -> list[list[Planned]]:
@@ -155,17 +142,6 @@ def _key(exercise: Exercise) -> str:
     return json.dumps(dataclasses.asdict(exercise), sort_keys=True, default=np.ndarray.tolist)
 
 
-@contextlib.contextmanager
-def _locked(folder: pathlib.Path) -> Iterator[None]:
-    """Lock a folder as a context. Raises ValueError while another process has it."""
-    with open(folder / LOCK_FILE, 'w') as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ValueError(f'{folder}: another acceptance is using this folder') from None
-        yield
-
-
 class _Results:
     """Results in a folder. Raises ValueError for a broken file, and for that of another specification."""
     kept: list[Kept]
@@ -175,7 +151,7 @@ class _Results:
         self._file, self.kept, self.sessions = folder / RESULTS_FILE, [], []
         self._sha256 = specification.sha256
         if self._file.exists():
-            before, self.sessions, self.kept = _read(self._file)
+            self.kept, self.sessions, before = read(folder)
             if before != self._sha256:
                 raise ValueError(f'{self._file}: holds results of another specification; choose a new folder')
         self.sessions.append(Session(_now(), parameters))
@@ -206,12 +182,14 @@ def _now() -> str:
     return utc_text(datetime.datetime.now(datetime.timezone.utc))
 
 
-def _read(file: pathlib.Path) -> tuple[str, list[Session], list[Kept]]:
-    """Return (SHA-256 of the specification, sessions, results) of a file. Raises ValueError for a broken one."""
+def read(folder: pathlib.Path) -> tuple[list[Kept], list[Session], str]:
+    """Return (results, runs of the sequence, SHA-256 of the specification) of a folder. Raises ValueError for a broken
+    file."""
+    file = folder / RESULTS_FILE
     try:
         content = json.loads(files.read_text(file, MAX_RESULTS_BYTES))
-        return (content['specification_sha256'], [Session(*one) for one in content['sessions']],
-                list(map(_kept, content['results'])))
+        return (list(map(_kept, content['results'])), [Session(*one) for one in content['sessions']],
+                content['specification_sha256'])
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f'{file}: is no file of results: {error!r}') from None
 

@@ -15,9 +15,9 @@ from pedestal_common.quantities import Bools, Degrees, Floats, Radians, RadiansP
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
-from pedestal_results.intervals import half_width, pseudo_values
+from pedestal_results.intervals import half_width
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, Track
-from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method, of_parts
 from pedestal_workbench.calibration.drive import motion_data
 from pedestal_workbench.calibration.drive.motion_data import Motion
 
@@ -93,10 +93,9 @@ def plan(antenna: Antenna, arguments: Arguments) -> Plan:
 
 def drive_of(antenna: Antenna, name: str) -> AxisParameters:
     """Return the drive parameters of an axis. Raises ValueError for an antenna without them."""
-    axis: AxisParameters | None = getattr(antenna.adu, name, None)
-    if axis is None:
-        raise ValueError('the parameters of the drive are not known; this method needs its gear ratio')
-    return axis
+    if drive := antenna.drive(name):
+        return drive
+    raise ValueError('the parameters of the drive are not known; this method needs its gear ratio')
 
 
 class Followed(NamedTuple):
@@ -117,8 +116,7 @@ class Followed(NamedTuple):
 
     def rms_error(self, begin: Seconds, end: Seconds = math.inf) -> Measured:
         """Return the rms error between two times."""
-        value, uncertainty = over_parts(self.error[self.between(begin, end)], tracking.rms)
-        return Measured(value, math.hypot(uncertainty, self.uncertainty))
+        return over_parts(self.error[self.between(begin, end)], tracking.rms).widened(self.uncertainty)
 
 
 def followed(performed: Performed, arguments: Arguments) -> Followed:
@@ -137,22 +135,20 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
 
 def encoder_uncertainty(antenna: Antenna, name: str) -> Degrees:
     """Return the uncertainty of an angle by the resolution of the load encoder, 0 if the resolution is not known."""
-    drive: AxisParameters | None = getattr(antenna.adu, name, None)
+    drive = antenna.drive(name)
     return UNIFORM_SHARE * 360.0 / 2**drive.encoder.load_bits if drive else 0.0
 
 
 def mean(values: Floats | list[float], uncertainty: float = 0.0) -> Measured:
     """Return the mean of values by their scatter. uncertainty: that all values share."""
-    return Measured(float(np.mean(values)), math.hypot(half_width(np.ravel(values)), uncertainty))
+    return Measured(float(np.mean(values)), half_width(np.ravel(values))).widened(uncertainty)
 
 
 def over_parts(values: Floats, statistic: Callable[[Floats], float]) -> Measured:
     """Return a statistic of a stretch of values, with the jackknife over its parts. Raises ValueError."""
     if len(values) < 2 * PART_COUNT:
         raise ValueError(f'the recording holds {len(values)} steps of the motion, must be at least {2 * PART_COUNT}')
-    pieces = np.array_split(values, PART_COUNT)
-    return Measured(float(statistic(values)),
-                    half_width(pseudo_values(pieces, lambda kept: statistic(np.concatenate(kept)))))
+    return of_parts(np.array_split(values, PART_COUNT), statistic)
 
 
 # Slew: rate, acceleration and braking.
@@ -279,7 +275,7 @@ def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats,
     if size < 0.5 * float(arguments['size']):
         raise ValueError(f'the reference moved by {size:.4g} deg in the step, must be {arguments["size"]} deg')
     noise = float(np.std(motion.error[motion.t > motion.t[-1] - 2.0]))
-    drive: AxisParameters | None = getattr(performed.antenna.adu, str(arguments['axis']), None)
+    drive = performed.antenna.drive(str(arguments['axis']))
     waves = math.degrees(drive.encoder.error.interpolation) if drive else 0.0
     return (motion.t[after] - at, motion.angle[after] - before, size,
             max(noise, math.hypot(motion.uncertainty, 0.5 * waves)))

@@ -14,13 +14,13 @@ import math
 import numpy as np
 
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Bools, Json, Pairs, Radians, Seconds, Times
+from pedestal_common.quantities import Bools, Floats, Json, Pairs, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_results import intervals, tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.results import RESULT_BY_NAME
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span
-from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method, of_parts
 from pedestal_workbench.calibration import collect, predicted
 from pedestal_workbench.calibration.receiver import beacon_offsets, matrix
 
@@ -142,18 +142,18 @@ def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
     return Exercise((1 + len(offsets)) * POINT_TIME_S, travel(antenna), tuple(actions), start, changes=changes)
 
 
-def _of_blocks(errors: Pairs, value: float) -> Measured:
-    """Return an rms of errors in the order of time with its uncertainty, by the jackknife over blocks.
-
-    Because neighbouring blocks may be correlated, the half width grows by sqrt((1 + r) / (1 - r)). r is the
-    correlation of successive pseudo-values. Because r of BLOCK_COUNT values is itself uncertain by MIN_CORRELATION,
-    r is at least that.
-    """
-    values = intervals.pseudo_values(np.array_split(errors, BLOCK_COUNT),
-                                     lambda blocks: tracking.known_rms(np.concatenate(blocks)))
+def _by_correlation(values: Floats) -> float:
+    """Return the factor sqrt((1 + r) / (1 - r)) by which a half width grows, because neighbouring blocks may be
+    correlated. r is the correlation of successive pseudo-values. Because r of BLOCK_COUNT values is itself uncertain
+    by MIN_CORRELATION, r is at least that."""
     rest = values - values.mean()
     r = min(max(float(rest[1:] @ rest[:-1] / (rest @ rest)), MIN_CORRELATION), MAX_CORRELATION)
-    return Measured(value, intervals.half_width(values) * math.sqrt((1.0 + r) / (1.0 - r)))
+    return math.sqrt((1.0 + r) / (1.0 - r))
+
+
+def _of_blocks(errors: Pairs, value: float) -> Measured:
+    """Return an rms of errors in the order of time with its uncertainty, by the jackknife over blocks."""
+    return of_parts(np.array_split(errors, BLOCK_COUNT), tracking.known_rms, _by_correlation)._replace(value=value)
 
 
 def _autotrack_rms(performed: Performed, _: Arguments) -> Measured:

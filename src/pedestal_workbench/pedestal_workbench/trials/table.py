@@ -2,7 +2,6 @@
 when their batch ends. A killed process loses the rows of unfinished batches, and leaves at most one incomplete line.
 The same trials, started again, continue after the last complete row."""
 import csv
-import fcntl
 import io
 import json
 import math
@@ -13,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from pedestal_common.quantities import Floats, Json
+from pedestal_common.text_files import files
 
 LEADING_COLUMNS = ('trial', 'seed')  # columns before the varied parameters and the results
 
@@ -48,12 +48,10 @@ class Table:
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self._stream = open(self.file, 'a+b')
         try:
-            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            files.lock(self._stream, f'{self.file}: another process writes the file')
             self._begin()
-        except BaseException as error:
+        except BaseException:
             self._stream.close()
-            if isinstance(error, BlockingIOError):
-                raise ValueError(f'{self.file}: another process writes the file') from None
             raise
         return self
 
