@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.params import AcuParameters
+from pedestal_studies.result import FIRST_SEED
 from pedestal_studies.system import structure as study
 
 
@@ -17,6 +18,12 @@ def test_the_default_holds_what_the_filter_before_held_and_all_models_lose(monke
     found = {name: study.tracked(name, 0) for name in study.CASES}
     assert found['default'][0] == found['before'][0] == 100.0 and found['all models'][0] < 20.0
     assert found['default'][1] < 0.07 and found['default'][1] <= study.MAX_POINTING_RATIO * found['before'][1]
+
+
+@pytest.mark.parametrize('place, seed', [('leo_pass/14Hz-0.2-gusts', 4), ('ship_pass/20Hz-0.2-gusts', 9)])
+def test_a_dish_that_swings_in_gusts_is_no_wrong_slope(place, seed):
+    """The sums about the program took the swing of the dish for a wrong slope."""
+    assert study.tracked(f'{place}/default', seed - FIRST_SEED)[0] == 100.0
 
 
 @pytest.mark.thorough

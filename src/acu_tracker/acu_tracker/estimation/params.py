@@ -180,7 +180,7 @@ class TrackerParameters(Parameters):
                                   must_be='at least coast_after')
     handover: bool = flag(True, 'automatic hand-over from program to autotrack after lock')
     keeps_program: bool = flag(False, 'target that keeps to its program except for a constant delay and slow errors, '
-                               'as a satellite does; a wrong slope of the receiver is then reported sooner')
+                               'as a satellite does; a rigid antenna then reports a wrong slope sooner')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
     matrix: ErrorMatrixParameters = group(ErrorMatrixParameters)
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)

@@ -144,7 +144,7 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
         if outcome != OUTCOME_NOISY and counts:
             monitors.take_divergence(tracking.divergence, innovation, measurement, tracking.target.roughness.q)
     if loop.closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
-        _watch_slope(tracking, params, inputs, at, deck.mat, loop.program)
+        _watch_slope(tracking, constants, inputs, at, deck.mat, loop.program)
     return _write_innovation(outputs, outcome, innovation)
 
 
@@ -308,15 +308,17 @@ def _follow_with_frame(state: Target, constants: target.Constants) -> None:
 
 
 @compiled
-def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs, at: Pointing,
+def _watch_slope(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: Pointing,
                  mat_ed: Rotation, program: ProgramTrack) -> None:
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
+    params, azimuth, elevation = constants.p.tracker, constants.axis[0].p, constants.axis[1].p
+    rigid = azimuth.structure.inertia_share == 0.0 and elevation.structure.inertia_share == 0.0
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
     leaving = monitors.leaving_error(tracking.divergence, params.receiver.beamwidth)
     wrong = monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
                                 params.coast_after, leaving)
-    if params.keeps_program and monitors.full(tracking.wrong_slope):
+    if params.keeps_program and rigid and monitors.full(tracking.wrong_slope):
         walk = 0.0
         if tracking.attitude.stabilised:
             _, (tilt, heading) = attitude.expected_error(tracking.attitude.error, params.attitude)

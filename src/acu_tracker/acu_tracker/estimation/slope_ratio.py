@@ -24,7 +24,8 @@ the right slope S exceeds its limit once in exp(limit) blocks or less often (Lor
       offset jumps has such a misfit before the beam follows
 
 A target that leaves its program while the beam follows with the delay of its filter may look like a wrong slope
-(docs/develop/decisions.md states how often). Therefore only a target with `keeps_program` is tested.
+(docs/develop/decisions.md states how often). Therefore only a target with `keeps_program` is tested. Gusts swing the
+dish of a flexible structure, which no encoder shows. Therefore only a rigid antenna makes this test.
 """
 import math
 from typing import Annotated
