@@ -478,8 +478,8 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
-    'bode', 'filters', 'target-filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration', 'structure',
-    'wrong-slope')))
+    'bode', 'filters', 'target-filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration', 'consistency',
+    'structure', 'wrong-slope')))
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:

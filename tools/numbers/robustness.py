@@ -1,24 +1,37 @@
-"""Tables of the studies wrong-slope and structure: what the target filter and its alarm do with a bad receiver or
-antenna."""
+"""Tables of the studies consistency, wrong-slope and structure: how sure the target filter is, and what filter and
+alarm do with a bad receiver or antenna."""
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
+from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Row
 from pedestal_results.intervals import missed
-from pedestal_studies.system import structure, wrong_slope
+from pedestal_studies.system import consistency, structure, wrong_slope
 
 Rows: TypeAlias = Mapping[tuple[str, str, str], Row]
 Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
-def _cell(rows: Rows, case: str, metric: str, form: str = '.1f') -> str:
+def _interval(rows: Rows, study: str, case: str, metric: str, form: str) -> str:
     """Return 'mean (low to high)' of a row; '-' without a row, or for an end that the runs do not reach."""
-    key = 'wrong-slope', case, metric
+    key = study, case, metric
     if key not in rows:
         return '-'
     value, low, high = ('-' if rows[key][part] is None else f'{rows[key][part]:{form}}'
                         for part in ('value', 'ci_low', 'ci_high'))
-    return f'{value} ({low} to {high})'
+    return f'{value} ({low} to {high})' + ' MISSED' * missed(rows[key])
+
+
+def _cell(rows: Rows, case: str, metric: str, form: str = '.1f') -> str:
+    """Return the interval of a row of wrong-slope."""
+    return _interval(rows, 'wrong-slope', case, metric, form)
+
+
+def consistency_table(rows: Rows) -> Content:
+    """Return the table of the NEES, over the time after the first estimate."""
+    return ('case', 'axis', *(f'{time:g} s' for time in consistency.TIMES_S)), [
+        (f'`{case}`', axis, *(_interval(rows, 'consistency', case, f'nees_{axis}_{time:g}_s', '.2f')
+                              for time in consistency.TIMES_S)) for case in consistency.CASES for axis in AXES]
 
 
 def slope_table(rows: Rows) -> Content:
@@ -54,15 +67,13 @@ def structure_table(rows: Rows) -> Content:
     """Return the table of the ratios of the study structure, and of the lost runs."""
     def cell(case: str) -> str:
         held, lost = (round(rows['structure', case, metric]['value']) for metric in ('held_runs', 'lost_runs'))
-        key = 'structure', case, structure.RATIO
-        if key not in rows:
-            return f'{lost} of {held} lost' + ' MISSED' * (lost > 0) if held else ''
-        ratio = rows[key]
-        return f'{ratio["value"]:.3f} ({ratio["ci_low"]:.3f} to {ratio["ci_high"]:.3f})' + ' MISSED' * missed(ratio)
+        if ('structure', case, structure.RATIO) in rows:
+            return _interval(rows, 'structure', case, structure.RATIO, '.3f')
+        return f'{lost} of {held} lost' + ' MISSED' * (lost > 0) if held else ''
     return ('share', 'air', *(f'{frequency:g} Hz' for frequency in structure.FREQUENCIES_HZ)), [
         (f'{share:g}', air, *(cell(f'{frequency:g}Hz-{share:g}-{air}') for frequency in structure.FREQUENCIES_HZ))
         for share in structure.SHARES for air in structure.AIR_PARAMETERS]
 
 
-TABLES = {'wrong slopes': slope_table, 'reversed slopes': reversal_table, 'limits of the alarm': limit_table,
-          'filter on a structure': structure_table}
+TABLES = {'consistency': consistency_table, 'wrong slopes': slope_table, 'reversed slopes': reversal_table,
+          'limits of the alarm': limit_table, 'filter on a structure': structure_table}
