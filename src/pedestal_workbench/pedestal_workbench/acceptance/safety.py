@@ -205,7 +205,9 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
     axis, rate = plan(antenna, {'axis': AXES[0]}), math.radians(RAMP_DEG_S) if mode == 'ramp' else 0.0
     made = axis.exercise(finish, math.radians(ENVELOPE_DEG) + rate * finish, axis.rate,
                          axis.preset(BEGIN_S, 0.0, rate, finish), *actions)
-    return dataclasses.replace(made, alarms=ALARM_NAMES)
+    # A fault shows in both axes, as the noise of the encoders does.
+    azimuth, elevation = (span._replace(rate=largest.rate) for span, largest in zip(made.envelope, travel(antenna)))
+    return dataclasses.replace(made, envelope=(azimuth, elevation), alarms=ALARM_NAMES)
 
 
 def _onset(performed: Performed, arguments: Arguments) -> tuple[Seconds, Seconds]:
