@@ -28,7 +28,7 @@ RATE_RAD_S, MIN_PERIODS, QUIET_RATIO = 0.025, 3, 5.0
 """Largest constant rate [rad/s], at which a bad tooth meets few of the periods. Least number of used periods, and
 their largest distance from the median of all periods over the least distance [-]."""
 FRICTION_SHARE = 0.003
-"""Share of a value by which it depends on the constant rate, by the friction [-]. Means of 8 seeds differ by 0.0024."""
+"""Share of a value by which it depends on the constant rate, by the friction [-]. Means of 8 seeds are 0.0024 off."""
 MIN_CORRELATION = 0.3   # least correlation of the command and the multisine [-]
 MIN_NOTCH_DB, MAX_NOISE = 3.0, 0.1      # least depth of a notch [dB], largest noise of its frequencies over |L| [-]
 
