@@ -15,6 +15,7 @@ from typing import TypeAlias
 
 from tools import pages
 from tools.numbers import claims, robustness
+from tools.numbers.robustness import Content
 
 import pedestal_studies
 from pedestal import console
@@ -31,7 +32,6 @@ from pedestal_studies.system import acquisition, budget, filters, target_filters
 from pedestal_workbench.trials import monte_carlo
 
 Key: TypeAlias = tuple[str, str, str]   # of a row: study, case, metric
-Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]  # of a table: heads of the columns, lines of cells
 Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout

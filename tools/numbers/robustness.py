@@ -9,7 +9,7 @@ from pedestal_results.intervals import missed
 from pedestal_studies.system import consistency, structure, wrong_slope
 
 Rows: TypeAlias = Mapping[tuple[str, str, str], Row]
-Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
+Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]  # of a table: heads of the columns, lines of cells
 
 
 def _interval(rows: Rows, study: str, case: str, metric: str, form: str) -> str:

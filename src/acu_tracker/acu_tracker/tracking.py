@@ -6,7 +6,7 @@ from acu_tracker import signals
 from acu_tracker.estimation import monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, frames, history
-from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, line_of_sight, rotated
+from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, dot, line_of_sight, minus, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
@@ -147,11 +147,11 @@ def departure(tracking: Tracking, constants: 'Constants', program: ProgramTrack,
     u, v = sight(tracking, constants, t).u, sight(tracking, constants, before).u
     p, q = (line_of_sight(program_track.motion_at(program, t)).u,
             line_of_sight(program_track.motion_at(program, before)).u)
-    x, y, z = v.x - q.x, v.y - q.y, v.z - q.z
-    if math.sqrt(x * x + y * y + z * z) > MAX_DEPARTURE_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth:
+    off = minus(v, q)
+    if math.sqrt(dot(off, off)) > MAX_DEPARTURE_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth:
         return 0.0
-    x, y, z = u.x - p.x - x, u.y - p.y - y, u.z - p.z - z
-    return math.sqrt(x * x + y * y + z * z)
+    gone = minus(minus(u, p), off)
+    return math.sqrt(dot(gone, gone))
 
 
 @compiled

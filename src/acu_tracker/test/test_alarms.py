@@ -141,11 +141,11 @@ def test_the_overshoot_of_a_stop_is_no_runaway_and_an_axis_that_accelerates_is_o
     runaway = [fast, 0.6 * fast, 0.2 * fast, -0.2 * fast - 0.05, -0.6 * fast]
 
     def opposed(rates):
-        told = []
+        found = []
         for dy in rates:
-            told.append(detectors.opposes_command(d, sign * dy, max(sign, 0.0), min(sign, 0.0), 0.05, T))
+            found.append(detectors.opposes_command(d, sign * dy, max(sign, 0.0), min(sign, 0.0), 0.05, T))
             d['dy'] = sign * dy
-        return told
+        return found
     assert not any(opposed(stop))
     assert opposed(runaway) == [False] * 3 + [True] * 2
     opposed([0.0] * 1000)

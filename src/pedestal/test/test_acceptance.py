@@ -112,11 +112,11 @@ def test_results_stay_and_another_specification_needs_another_folder(accept, tmp
     assert code == 2 and 'another specification' in errors
 
 
-LOST = '--param', 'adu.inject=0.1 motor_loss axis=azimuth motor=1'
+MOTOR_LOSS_OPTIONS = '--param', 'adu.inject=0.1 motor_loss axis=azimuth motor=1'
 
 
 def test_an_alarm_fails_its_requirement_and_is_exit_code_4(accept, tmp_path):
-    code, said, _ = accept(TITLE + STEP + SLEW, '--yes', *LOST)
+    code, said, _ = accept(TITLE + STEP + SLEW, '--yes', *MOTOR_LOSS_OPTIONS)
     assert code == 4 and 'Not passed: 2 failed of 2' in said
     assert re.search('failed        step: not measured: step-1, after .* s: alarm azimuth motor lost, must be', said)
     folder = tmp_path / 'acceptance-spec'
@@ -128,7 +128,7 @@ def test_an_alarm_fails_its_requirement_and_is_exit_code_4(accept, tmp_path):
 def test_a_sequence_that_is_stopped_is_exit_code_1_with_a_report(accept, tmp_path, monkeypatch):
     """By an alarm of a running graph, for which the closed loop stands in."""
     monkeypatch.setattr(in_loop.InLoop, 'own_runs', False)
-    code, _, errors = accept(TITLE + STEP + SLEW, '--yes', *LOST)
+    code, _, errors = accept(TITLE + STEP + SLEW, '--yes', *MOTOR_LOSS_OPTIONS)
     assert code == 1 and 'alarm azimuth motor lost' in errors and 'the same command continues' in errors
     page = (tmp_path / 'acceptance-spec' / 'report.html').read_text()
     assert 'The sequence did not come to its end; stopped: ' in page and '1 failed, 1 not performed of 2' in page

@@ -109,6 +109,6 @@ def test_a_slope_with_which_the_loop_holds_its_target_is_no_alarm(case):
     target, name = case.split('/')
     table = study.measured(target, 0)
     assert table[0, 0] == 0.0
-    if name != study.RIGHT:
+    if name != study.RIGHT_CASE:
         held = table[1 + NAMES.index(name)]
         assert np.isnan(held[ALARM]) and held[-2] < 0.5 and held[-1] == 0.0

@@ -15,9 +15,9 @@ from fpdf import FPDF
 
 from pedestal_results.report.figures import INK_COLOUR
 
-FONT = 'DejaVu Sans'    # of the figures too; it comes with matplotlib
+FONT_NAME = 'DejaVu Sans'    # of the figures too; it comes with matplotlib
 TABLE_PT, LINE_HEIGHT = 6.5, 1.35   # size of the texts of tables [pt], height of a line over the size of its text [-]
-STYLES = {'h1': ('B', 15.0), 'h2': ('B', 11.0), 'h3': ('B', 8.5), 'verdict': ('B', 11.0), 'bad': ('B', 8.0)}
+STYLE_BY_KIND = {'h1': ('B', 15.0), 'h2': ('B', 11.0), 'h3': ('B', 8.5), 'verdict': ('B', 11.0), 'bad': ('B', 8.0)}
 """{tag or class of a text: style and size [pt]}; a text without them has TEXT_STYLE."""
 TEXT_STYLE = '', 7.5
 GAP_MM, BOTTOM_MM, MIN_TABLE_MM, SIGNATURE_MM = 3.0, 15.0, 30.0, 14.0
@@ -27,7 +27,7 @@ LINE_COLOUR = '#b0b6be'     # not grey: fpdf2 2.8.9 draws no text of an SVG besi
 MAX_CELL_CHARS = 1500       # of a cell, which must fit on a page
 TEXTS, WAITING = ('title', 'h1', 'h2', 'h3', 'p', 'figcaption', 'li', 'th', 'td'), ('h1', 'h2', 'h3', 'figcaption')
 """Elements with a text, and those of them that stand on the page of the next element."""
-EPOCH = datetime.datetime.fromtimestamp(0.0, datetime.timezone.utc)
+EPOCH_UTC = datetime.datetime.fromtimestamp(0.0, datetime.timezone.utc)
 
 
 class _Paper(FPDF):
@@ -39,7 +39,7 @@ class _Paper(FPDF):
         self.set_auto_page_break(True, BOTTOM_MM)
         folder = pathlib.Path(matplotlib.get_data_path(), 'fonts', 'ttf')
         for style, file in (('', 'DejaVuSans.ttf'), ('B', 'DejaVuSans-Bold.ttf')):
-            self.add_font(FONT, style, folder / file)
+            self.add_font(FONT_NAME, style, folder / file)
         self.set_draw_color(LINE_COLOUR)
         self.set_line_width(0.1)
         self.add_page()
@@ -47,27 +47,27 @@ class _Paper(FPDF):
     def footer(self) -> None:
         """Write the number of the page; the library calls this."""
         self.set_y(-0.8 * BOTTOM_MM)
-        self.set_font(FONT, size=TABLE_PT)
+        self.set_font(FONT_NAME, size=TABLE_PT)
         self.cell(0.0, None, f'{self.title}: page {self.page_no()} of {{nb}}', align='R')
 
     def write_texts(self, texts: Sequence[tuple[str, str]], space: float) -> None:
         """Write (tag or class, text), on the next page where `space` is not left after them [mm]."""
-        styled = [(*STYLES.get(kind, TEXT_STYLE), text) for kind, text in texts]
+        styled = [(*STYLE_BY_KIND.get(kind, TEXT_STYLE), text) for kind, text in texts]
         for style, size, text in styled:
-            self.set_font(FONT, style, size)
+            self.set_font(FONT_NAME, style, size)
             lines = math.ceil(self.get_string_width(text) / self.epw)
             space += lines * LINE_HEIGHT * self.font_size + GAP_MM
         if self.will_page_break(space):
             self.add_page()
         for style, size, text in styled:
-            self.set_font(FONT, style, size)
+            self.set_font(FONT_NAME, style, size)
             self.ln(0.2 * size)
             self.multi_cell(0.0, LINE_HEIGHT * self.font_size, text, align='L', new_x='LMARGIN', new_y='NEXT')
 
     def write_table(self, rows: Sequence[Sequence[str]], headed: bool, right: Sequence[bool], signed: bool) -> None:
         """Write a table. A narrow column is as wide as its texts; the wide ones share the rest of the page. right:
         columns with numbers; signed: its rows have space for a signature."""
-        self.set_font(FONT, 'B', TABLE_PT)      # of the heads, which is the wider one
+        self.set_font(FONT_NAME, 'B', TABLE_PT)      # of the heads, which is the wider one
         widths = [max(map(self.get_string_width, column)) + GAP_MM for column in zip(*rows)]
         rest, widest = self.epw, self.epw
         for i, width in enumerate(sorted(widths)):
@@ -76,7 +76,7 @@ class _Paper(FPDF):
                 break
             rest -= width
         widths = [min(width, widest) for width in widths]
-        self.set_font(FONT, size=TABLE_PT)
+        self.set_font(FONT_NAME, size=TABLE_PT)
         with self.table(col_widths=widths, width=self.epw if signed else min(sum(widths), self.epw), align='L',
                         first_row_as_headings=headed, borders_layout='HORIZONTAL_LINES', v_align='T',
                         text_align=tuple('RIGHT' if each else 'LEFT' for each in right),
@@ -108,7 +108,7 @@ class _Printer(HTMLParser):
             self._rows.append([])
             self._right = []
         elif tag in TEXTS:
-            self._text, self._kind = '', next((kind for kind in kinds if kind in STYLES), tag)
+            self._text, self._kind = '', next((kind for kind in kinds if kind in STYLE_BY_KIND), tag)
             self._right.append('n' in kinds)
 
     def handle_data(self, data: str) -> None:
@@ -143,7 +143,7 @@ class _Printer(HTMLParser):
         self._paper.image(io.BytesIO(whole.encode()), w=self._paper.epw)
 
 
-def pdf(page: str, made: datetime.datetime = EPOCH) -> bytes:
+def pdf(page: str, made: datetime.datetime = EPOCH_UTC) -> bytes:
     """Return the PDF of a page of elements.page. made: date in its metadata. Equal pages give equal bytes."""
     paper = _Paper(made)
     printer = _Printer(paper)

@@ -77,7 +77,7 @@ SLOPES = {**{_name(factor, turn): _of_both(factor, turn) for factor, turn in (
           'sign-elevation': Slope(-1.0, {'axis': 'elevation'}, 1)}
 GROSS_SLOPES = tuple(name for name, slope in SLOPES.items() if slope.factor.real < 1e-9)
 """Slopes that drive the beam away from the target."""
-RIGHT = 'right'  # name of the case without a wrong slope
+RIGHT_CASE = 'right'  # name of the case without a wrong slope
 
 EARLIEST_ONSET_S, LATEST_ONSET_S, RUN_AFTER_ONSET_S = 6.0, 20.0, 2.0
 LONG_RUN_S, LONG_RUN_SPACING = 60.0, 8  # duration of every eighth run of the case `right`; others end at the onset
@@ -110,7 +110,7 @@ def reached(loop: Loop) -> tuple[float, float]:
     return score / monitors.WRONG_SLOPE_MARGIN, float(largest) / slope_ratio.MAX_S
 
 
-def _told(loop: Loop) -> bool:
+def _alarmed(loop: Loop) -> bool:
     return bool(loop.units['acu'].parts['state']['tracking']['divergence']['diverged'])
 
 
@@ -152,9 +152,9 @@ def _quiet(loop: Loop, last: int) -> Floats:
 
     def watch(made: int) -> int:
         np.maximum(most, reached(loop), out=most)
-        return 0 if _told(loop) else COARSE_STEPS
+        return 0 if _alarmed(loop) else COARSE_STEPS
     on = loop.run(watch=watch, last=last)['acu/mode'] == Mode.AUTOTRACK
-    return np.array([_told(loop), on.sum() * loop.period_ns / 3.6e12, *most])
+    return np.array([_alarmed(loop), on.sum() * loop.period_ns / 3.6e12, *most])
 
 
 def _after_onset(loop: Loop, name: str) -> Floats:
@@ -165,12 +165,13 @@ def _after_onset(loop: Loop, name: str) -> Floats:
     spacing = FINE_STEPS if name in GROSS_SLOPES else COARSE_STEPS
 
     def watch(made: int) -> int:
-        share = math.inf if _told(loop) else min(max(reached(loop)), LIMIT_FACTORS[-1])
+        share = math.inf if _alarmed(loop) else min(max(reached(loop)), LIMIT_FACTORS[-1])
         steps[np.isnan(steps) & (share > np.array(LIMIT_FACTORS))] = made - onset
-        return spacing if _tracks(loop) and not _told(loop) else 0
+        return spacing if _tracks(loop) and not _alarmed(loop) else 0
     run = loop.run(watch=watch, last=onset + round(RUN_AFTER_ONSET_S * 1e9 / loop.period_ns))
     watch(loop.made)
-    return np.array([*steps, _known_steps(run, SLOPES[name]), _largest_error(run), not (_tracks(loop) or _told(loop))])
+    lost = not (_tracks(loop) or _alarmed(loop))
+    return np.array([*steps, _known_steps(run, SLOPES[name]), _largest_error(run), lost])
 
 
 def measured(target: str, number: int) -> Floats:
@@ -182,7 +183,7 @@ def measured(target: str, number: int) -> Floats:
     onset = math.ceil(np.random.default_rng(seed).uniform(EARLIEST_ONSET_S, latest) * 1e9 / loop.period_ns)
     table = np.full((1 + len(SLOPES), COLUMN_COUNT), np.nan)
     quiet = _quiet(loop, onset)
-    if _tracks(loop) and not _told(loop):
+    if _tracks(loop) and not _alarmed(loop):
         for line, name in zip(table[1:], SLOPES):
             line[:] = _after_onset(loop.copy(), name)
         if number % LONG_RUN_SPACING == 0:
@@ -197,7 +198,7 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
     of_all = {'all': np.concatenate(list(values.values())), **values}
     table = _limit_rows(of_all['all'])
     for target, of_runs in of_all.items():
-        table += _right_rows(f'{target}/{RIGHT}', of_runs[:, 0])
+        table += _right_rows(f'{target}/{RIGHT_CASE}', of_runs[:, 0])
         for k, slope in enumerate(SLOPES, 1):
             table += _slope_rows(f'{target}/{slope}', slope in GROSS_SLOPES, of_runs[:, k])
     return table
@@ -212,8 +213,8 @@ def alarm_rate(count: int, hours: float) -> Estimate:
 
 def _false_alarms(of_right: Floats) -> list[Estimate]:
     """Return the false alarms per 10 h with the limits times each of LIMIT_FACTORS."""
-    told, hours, *most = of_right[:, :4].T
-    share = np.where(told > 0.0, math.inf, np.minimum(np.max(most, axis=0), LIMIT_FACTORS[-1]))
+    alarms, hours, *most = of_right[:, :4].T
+    share = np.where(alarms > 0.0, math.inf, np.minimum(np.max(most, axis=0), LIMIT_FACTORS[-1]))
     return [alarm_rate(int((share > factor).sum()), float(hours.sum())) for factor in LIMIT_FACTORS]
 
 
@@ -221,16 +222,16 @@ def _limit_rows(of_all: Floats) -> list[Row]:
     """Return the rows of LIMIT_FACTORS, over all targets and gross slopes."""
     gross = of_all[:, [k for k, name in enumerate(SLOPES, 1) if name in GROSS_SLOPES]].reshape(-1, COLUMN_COUNT)
     steps = gross[np.isfinite(gross[:, -1]), :len(LIMIT_FACTORS)]
-    return [line for factor, false, told in zip(LIMIT_FACTORS, _false_alarms(of_all[:, 0]), steps.T) for line in (
+    return [line for factor, false, taken in zip(LIMIT_FACTORS, _false_alarms(of_all[:, 0]), steps.T) for line in (
         estimated(f'limits/{factor:g}', 'false_alarms_per_10_h', false, '', len(of_all)),
-        _share(f'limits/{factor:g}', 'in_time_percent', told <= MAX_ALARM_STEPS))]
+        _share(f'limits/{factor:g}', 'in_time_percent', taken <= MAX_ALARM_STEPS))]
 
 
 def _right_rows(case: str, of_runs: Floats) -> list[Row]:
-    told, hours, score, total = of_runs[:, :4].T
+    alarms, hours, score, total = of_runs[:, :4].T
     runs = len(of_runs)
-    return [row(case, 'false_alarms', int(told.sum()), target='<= 0'), row(case, 'hours', hours.sum(), 'h'),
-            estimated(case, 'false_alarms_per_10_h', alarm_rate(int(told.sum()), hours.sum()), '', runs),
+    return [row(case, 'false_alarms', int(alarms.sum()), target='<= 0'), row(case, 'hours', hours.sum(), 'h'),
+            estimated(case, 'false_alarms_per_10_h', alarm_rate(int(alarms.sum()), hours.sum()), '', runs),
             row(case, 'largest_score', score.max() * monitors.WRONG_SLOPE_MARGIN,
                 target=f'<= {monitors.WRONG_SLOPE_MARGIN:g}'),
             row(case, 'largest_sum', total.max() * slope_ratio.MAX_S, target=f'<= {slope_ratio.MAX_S:g}')]

@@ -108,4 +108,3 @@ class ClientSession(RemoteSession):
     def await_reply(self, number: str) -> None:
         """Wait for the reply to a request, which a silent node does not send."""
         self.until(lambda: self.remote.replied(number), STOP_TIMEOUT_S)
-

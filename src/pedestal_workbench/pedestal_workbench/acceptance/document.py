@@ -18,7 +18,7 @@ from pedestal_results.report import elements, figures, paper, subject
 from pedestal_workbench.acceptance import figure
 from pedestal_workbench.acceptance.exercise import Antenna
 from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED
-from pedestal_workbench.acceptance.sequence import COMPLETE, Kept, Session, utc_text
+from pedestal_workbench.acceptance.sequence import COMPLETE, SIGNALS_FOLDER, Kept, Session, utc_text
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
@@ -205,7 +205,7 @@ def _head(acceptance: Acceptance) -> list[tuple[str, str]]:
 
 def write(acceptance: Acceptance, folder: pathlib.Path) -> list[pathlib.Path]:
     """Write the report into a folder as HTML, PDF, JSON and JUnit XML, and return the paths."""
-    page = elements.page(acceptance.specification.head.title, _parts(acceptance, folder / 'signals'), CSS)
+    page = elements.page(acceptance.specification.head.title, _parts(acceptance, folder / SIGNALS_FOLDER), CSS)
     written = {'report.html': page.encode(), 'report.pdf': paper.pdf(page, acceptance.made),
                'report.json': json.dumps(json_content(acceptance), indent=1).encode(), 'report.xml': junit(acceptance)}
     folder.mkdir(parents=True, exist_ok=True)

@@ -103,8 +103,8 @@ def _margin(metric: str, performed: Performed, arguments: Arguments) -> Measured
 
 
 def _resonance(performed: Performed, arguments: Arguments) -> Measured:
-    """Return the lowest frequency at which the open loop has a notch. Without a notch, the
-    highest frequency is the lower bound: no resonance is below it."""
+    """Return the lowest frequency at which the open loop has a notch. Without a notch, the highest frequency is the
+    lower bound: no resonance is below it."""
     response = _response(*_signals(performed, arguments))
     known = response.deviation < MAX_NOISE
     if known.sum() < 2:

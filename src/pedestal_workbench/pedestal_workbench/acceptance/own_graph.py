@@ -24,7 +24,6 @@ from pedestal_workbench.acceptance import in_loop
 from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, StoppedError, Track
 
 MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a run in realtime [-]
-PRELOADED = __name__,       # modules of the process from which each run is forked
 
 
 class OwnGraph(in_loop.InLoop):
@@ -41,7 +40,7 @@ class OwnGraph(in_loop.InLoop):
 
     def __enter__(self) -> 'OwnGraph':
         starter = multiprocessing.get_context('forkserver')
-        starter.set_forkserver_preload(list(PRELOADED))
+        starter.set_forkserver_preload([__name__])
         self._pool = starter.Pool(1 if domain.VARIABLE in os.environ else os.cpu_count(), maxtasksperchild=1)
         return self
 

@@ -92,11 +92,13 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
 def _planned(left: Sequence[tuple[Requirement, Exercise]], seed: int) -> list[list[Planned]]:
     """Return the performances of each requirement. Requirements with equal exercises share them."""
     shared: dict[str, list[Planned]] = {}
+    of_each = []
     for requirement, exercise in left:
         found = shared.setdefault(_key(exercise), [])
         found += [(f'{requirement.file_name}-{i + 1}', exercise, seed + SEED_STEP * i)
                   for i in range(len(found), requirement.repetitions)]
-    return [shared[_key(exercise)][:requirement.repetitions] for requirement, exercise in left]
+        of_each.append(found[:requirement.repetitions])
+    return of_each
 
 
 def _result(requirement: Requirement, planned: Sequence[Planned], performer: Performer, folder: pathlib.Path,
