@@ -4,6 +4,7 @@ import dataclasses
 import importlib.resources
 import json
 import math
+import multiprocessing
 import os
 import pathlib
 import signal
@@ -108,6 +109,19 @@ def test_a_killed_sequence_continues(domain, tmp_path, start_process):
 
 
 @pytest.mark.thorough
+def test_a_killed_run_is_a_stop_and_no_wait_for_ever(domain, tmp_path):
+    with OwnGraph(UAV, tmp_path) as graph:
+        graph.expect([('killed', step(duration=600.0), 1)])
+        deadline = time.monotonic() + PATIENCE
+        while not (runs := multiprocessing.active_children()) or not (tmp_path / 'killed').exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        for run in runs:
+            run.kill()
+        with pytest.raises(StoppedError, match='the run ended early: died by signal SIGKILL'):
+            graph.perform('killed', step(duration=600.0), 1)
+
+
 def test_an_antenna_outside_of_its_envelope_is_stopped(domain, tmp_path):
     narrow = dataclasses.replace(step(duration=30.0), envelope=(Span(-1.0, 0.5, 40.0), SPAN))
     outside = 'azimuth 0.5.* deg: outside its envelope, -1.000 to 0.500 deg'

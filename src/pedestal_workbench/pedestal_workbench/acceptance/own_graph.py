@@ -6,11 +6,14 @@ import os
 import pathlib
 import signal
 from collections.abc import Mapping, Sequence
-from multiprocessing.pool import AsyncResult
+from concurrent.futures import Future, ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 
 import numpy as np
 
 from pedestal_bringup.graph import graph, pass_recorder
+from pedestal_bringup.graph.processes import exit_description
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import domain
@@ -36,17 +39,20 @@ class OwnGraph(in_loop.InLoop):
     def __init__(self, variant: Variant, folder: pathlib.Path) -> None:
         super().__init__(variant)
         self._folder = folder.resolve()
-        self._begun: dict[str, AsyncResult[int]] = {}   # runs that were begun ahead, by name
+        self._begun: dict[str, Future[int]] = {}    # runs that were begun ahead, by name
+        self._processes: list[BaseProcess] = []     # of runs
 
     def __enter__(self) -> 'OwnGraph':
-        starter = multiprocessing.get_context('forkserver')
-        starter.set_forkserver_preload([__name__])
-        self._pool = starter.Pool(1 if domain.VARIABLE in os.environ else os.cpu_count(), maxtasksperchild=1)
+        self._starter = multiprocessing.get_context('forkserver')
+        self._starter.set_forkserver_preload([__name__])
+        self._threads = ThreadPoolExecutor(1 if domain.VARIABLE in os.environ else os.cpu_count())
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._pool.terminate()
-        self._pool.join()
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for process in list(self._processes):
+            process.terminate()
+        self._threads.shutdown()
 
     def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
         """Begin the runs in lockstep, as many at a time as this computer has cores."""
@@ -54,16 +60,36 @@ class OwnGraph(in_loop.InLoop):
             if in_loop.pacing(exercise) == 'lockstep':
                 self._begun[name] = self._begin(name, exercise, seed)
 
-    def _begin(self, name: str, exercise: Exercise, seed: int) -> AsyncResult[int]:
+    def _begin(self, name: str, exercise: Exercise, seed: int) -> Future[int]:
         variant = in_loop.run_of(exercise, self._variant, self._scenario, seed)
-        return self._pool.apply_async(_run, (variant, in_loop.pacing(exercise), exercise.track, self._folder / name,
-                                             dict(os.environ)))
+        return self._threads.submit(self._losses, variant, in_loop.pacing(exercise), exercise.track,
+                                    self._folder / name, dict(os.environ))
+
+    def _losses(self, *arguments: object) -> int:
+        """Return the number of lost steps of a run in a process of its own. Raises RuntimeError if it ended early,
+        also if it was killed."""
+        receiver, sender = self._starter.Pipe(duplex=False)
+        process = self._starter.Process(target=_run, args=(sender, *arguments), daemon=True)
+        process.start()
+        self._processes.append(process)
+        sender.close()
+        try:
+            found: int | RuntimeError = receiver.recv()
+        except EOFError:
+            process.join()
+            assert process.exitcode is not None
+            raise RuntimeError(exit_description(process.exitcode)) from None
+        process.join()
+        self._processes.remove(process)
+        if isinstance(found, RuntimeError):
+            raise found
+        return found
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run. Raises StoppedError."""
         bag = self._folder / name
         try:
-            lost = (self._begun.pop(name, None) or self._begin(name, exercise, seed)).get()
+            lost = (self._begun.pop(name, None) or self._begin(name, exercise, seed)).result()
         except RuntimeError as error:
             raise StoppedError(f'the run ended early: {error}') from None
         if lost > MAX_LOST_STEP_SHARE * exercise.duration / self.antenna.period:
@@ -74,8 +100,10 @@ class OwnGraph(in_loop.InLoop):
         return Performed(self.antenna, exercise, recording, 0.0, in_loop.outcomes(exercise, recording), bag)
 
 
-def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, environment: Mapping[str, str]) -> int:
-    """Run a graph in this process, whose output goes to the log of its bag. Return the number of lost steps."""
+def _run(sender: Connection, variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path,
+         environment: Mapping[str, str]) -> None:
+    """Run a graph in this process, whose output goes to the log of its bag. Send the number of lost steps, or the
+    error."""
     os.setsid()     # a Ctrl-C on the terminal is for acceptance only, which then ends this process
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     acceptance = multiprocessing.parent_process()
@@ -90,7 +118,10 @@ def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, 
     with open(pass_recorder.log_of(bag), 'ab') as log:
         for stream in 1, 2:
             os.dup2(log.fileno(), stream)
-    return graph.run(Plan(variant.load(pacing), track), bag, contextlib.nullcontext(advance)).losses
+    try:
+        sender.send(graph.run(Plan(variant.load(pacing), track), bag, contextlib.nullcontext(advance)).losses)
+    except RuntimeError as error:
+        sender.send(error)
 
 
 def _trouble(recording: Recording, exercise: Exercise) -> StoppedError | None:
