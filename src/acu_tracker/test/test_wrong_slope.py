@@ -47,7 +47,7 @@ TURNED = 2 * FIRST_VERDICT
 
 def loop(target, slope, noise, bandwidth=12.0):
     """(angles, errors) of a beam in elevation, driven as a type II loop on a target (n,) [rad] until it is half a
-    radian off; slope: 1 or -1, from TURNED on."""
+    radian off; slope: that from TURNED on."""
     beam, rate, angles, errors = target[0], 0.0, [], []
     for k, (r, n) in enumerate(zip(target, noise)):
         e = (slope if k >= TURNED else 1.0) * (r - beam) + n
@@ -88,6 +88,18 @@ def test_a_reversed_slope_is_seen_while_the_beam_is_less_than_20_sigma_off(state
     off = np.abs(angles[:, 1] - 0.5 - target[:len(angles)])
     k = first(state, angles, errors)
     assert k > TURNED and off[k] < 20.0 * SIGMA
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_small_errors_with_the_wrong_sign_are_seen_while_the_beam_is_less_than_40_sigma_off(state, seed):
+    """They move the beam away slowly; the hypotheses of errors of the right size are silent."""
+    target = 0.01 * T * np.arange(4000)
+    angles, errors = loop(target, -0.3, np.random.default_rng(seed).normal(0.0, SIGMA, 4000))
+    off = np.abs(angles[:, 1] - 0.5 - target[:len(angles)])
+    k = first(state, angles, errors, leaving=1.0)
+    assert k > TURNED and off[k] < 40.0 * SIGMA
+    assert monitors.score(state, 3, 1.0) > 1.0 > max(
+        monitors.score(state, h, monitors.WRONG_SLOPE_RATIO) for h in range(3))
 
 
 def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_of_their_curve_or_none_at_all(state):
@@ -149,11 +161,12 @@ def test_the_turn_with_the_smoothest_direction_is_found_as_by_a_search(state):
         a, b = (innovations(means(x)) @ (1.0, 1.0j) / SIGMA * monitors.BLOCK_ERROR_COUNT**0.5 for x in pairs)
         share = 1.0 / monitors.SLOPE_BLOCK_COUNT
         weights = share * (1.0 - share)**np.arange(len(a))[::-1]
-        turns = np.radians(np.arange(90.0, 270.0, 0.01))
-        searched = min((weights * np.abs(a + np.exp(-1j * turn) * b)**2).sum() for turn in turns)
-        right, wrong = monitors.roughnesses(state, 2)
-        assert right == pytest.approx((weights * np.abs(a + b)**2).sum(), rel=1e-4)
-        assert wrong == pytest.approx(searched, rel=1e-3)
+        turns = np.exp(1j * np.radians(np.arange(90.0, 270.0, 0.01)))
+        for hypothesis, size in ((2, 1.0), (3, monitors.SMALL_SLOPE)):
+            searched = min((weights * np.abs(size * turn * a + b)**2).sum() for turn in turns)
+            right, wrong = monitors.roughnesses(state, hypothesis)
+            assert right == pytest.approx((weights * np.abs(a + b)**2).sum(), rel=1e-4)
+            assert wrong == pytest.approx(searched, rel=1e-3)
         for axis, (x, y) in enumerate(((a.real, b.real), (a.imag, b.imag))):
             assert monitors.roughnesses(state, axis) == pytest.approx(
                 [(weights * (x + sign * y)**2).sum() for sign in (1.0, -1.0)], rel=1e-4)
