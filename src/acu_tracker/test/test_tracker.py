@@ -43,10 +43,10 @@ class Target:
         state = self.state[0]
         target_filter.transfer(state['filter'], self.c['filter'], state['running'])
 
-    def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
+    def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE, sigma=SIGMA):
         """(outcome, AxisInnovation of the azimuth)."""
-        axis = (AxisMeasurement(azimuth, SIGMA**2, azimuth_rate, RATE_SIGMA**2),
-                AxisMeasurement(elevation, SIGMA**2, elevation_rate, RATE_SIGMA**2))
+        axis = (AxisMeasurement(azimuth, sigma**2, azimuth_rate, RATE_SIGMA**2),
+                AxisMeasurement(elevation, sigma**2, elevation_rate, RATE_SIGMA**2))
         outcome, innovation = receiver_error.gate(self.state[0], self.p, self.c, Measurement(stamp, axis, NONE, NONE),
                                               self.p['restart_gap'])
         return outcome, innovation.axis[0]
@@ -98,6 +98,18 @@ def test_stale_gated_counted_and_restarted_measurements():
     assert target.observe(320 * T + 2.0, 0.7)[0] == receiver_error.OUTCOME_STARTED
     assert target.outlook(320 * T + 2.0)[0] == pytest.approx(0.7)
     assert target.state['gated'] == 20
+
+
+@pytest.mark.parametrize('kind', ['imm', 'ca'])
+def test_a_strong_signal_does_not_gate_a_target_that_begins_to_turn(kind):
+    """Noise of 0.2 mdeg; after 3 s the target accelerates by 10 deg/s2. An outlier of 0.06 beamwidths is gated."""
+    target, sigma = Target(kind=kind), math.radians(2e-4)
+    t, rng = np.arange(0.0, 4.0, T), np.random.default_rng(1)
+    angle = 0.5 * math.radians(10.0) * np.maximum(t - 3.0, 0.0)**2 + rng.normal(0.0, sigma, len(t))
+    outcomes = [target.observe(stamp, y, sigma=sigma)[0] for stamp, y in zip(t, angle)]
+    assert outcomes[1:] == [receiver_error.OUTCOME_ACCEPTED] * (len(t) - 1)
+    outlier = target.outlook(t[-1] + T)[0] + 0.06 * target.params.receiver.beamwidth
+    assert target.observe(t[-1] + T, outlier, sigma=sigma)[0] == receiver_error.OUTCOME_GATED
 
 
 def test_only_refusals_in_a_row_restart():

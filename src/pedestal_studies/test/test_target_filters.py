@@ -5,6 +5,8 @@ import operator
 import numpy as np
 import pytest
 
+from acu_tracker.modes import Mode
+from pedestal_bringup.loop.closed_loop import Loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_studies.system import target_filters as study
 
@@ -42,6 +44,14 @@ def test_tables_of_hard_targets_have_the_accelerations_of_their_texts(tmp_path):
 def test_a_target_that_reverses_stays_in_autotrack(target):
     default, tuned = (pointing(f'{target}/{name}') for name in ('default', 'tuned'))
     assert np.all(default < study.MAX_POINTING_RATIO * tuned)
+
+
+@pytest.mark.parametrize('target', ['s-motion', 'square', 'chirp'])
+def test_a_target_that_reverses_stays_in_autotrack_with_a_strong_signal(target):
+    """The noise is so small that an acceleration of 11 deg/s2 is 20 of its sigmas after 0.1 s."""
+    loud = study.placed(f'{target}/default', 1).with_({'tracking_receiver.receiver.cn0_dbhz': 90.0}, duration=10.0)
+    autotrack = Loop(loud.load()).run()['acu/mode'] == Mode.AUTOTRACK
+    assert np.argmax(autotrack) > 0 and autotrack[np.argmax(autotrack):].all()
 
 
 def test_rows_of_every_case():

@@ -52,6 +52,11 @@ MAX_RISE_DB = 0.5
 hold the noise of the fade for longer than the published C/N0."""
 
 
+GATE_FLOOR_BEAMWIDTHS = 0.01
+"""Standard deviation that the gate adds to every prediction [beamwidths]. With a strong signal the noise is so small
+that a target which begins to turn would leave the gate before the filter knows of it."""
+
+
 class Loop(NamedTuple):
     """Conditions of the monitors. While a limit holds the beam off the target, both truth values are False."""
     closed: bool    # the loop is closed on the errors (autotrack)
@@ -230,7 +235,7 @@ def gate(state: Target, params: TrackerParameters, constants: target.Constants, 
         if innovation.range_nu * innovation.range_nu > constants.gates[1] * innovation.range_S:
             state.ranges_gated += 1
             measurement = Measurement(measurement.stamp, measurement.axis, math.nan, measurement.range_variance)
-        if innovation.axis[0].chi_square + innovation.axis[1].chi_square <= constants.gates[0]:
+        if _distance(innovation, measurement, GATE_FLOOR_BEAMWIDTHS * params.receiver.beamwidth) <= constants.gates[0]:
             measurement = _with_accepted_rates(state, params, constants, measurement, innovation)
             target_filter.correct(f, k, measurement)
             outcome = OUTCOME_ACCEPTED
@@ -251,6 +256,16 @@ def gate(state: Target, params: TrackerParameters, constants: target.Constants, 
     state.accepted_in_a_row = 1 if T > params.coast_after else state.accepted_in_a_row + 1
     state.converged = _converged(f, k, measurement, params.initial_rate)
     return outcome, innovation
+
+
+@compiled
+def _distance(innovation: Innovation, measurement: Measurement, floor: Radians) -> float:
+    """Return nu' S^-1 nu of the two angles [-], with the variance floor^2 added to each S across the line of sight."""
+    azimuth, elevation = innovation.axis
+    added = floor * floor
+    stretch = measurement.axis[0].variance / measurement.axis[1].variance   # 1 / cos^2 of the elevation
+    return (azimuth.nu * azimuth.nu / (azimuth.S + added * stretch)
+            + elevation.nu * elevation.nu / (elevation.S + added))
 
 
 @compiled
