@@ -93,7 +93,7 @@ def test_a_control_unit_of_a_real_drive_names_the_models_that_its_structure_does
     said = ''
     while 'ready, waits for' not in said and (line := process.stderr.readline()):
         said += line
-    assert ('the filter uses 4 of its 8 models ca in azimuth (structure of 8 Hz); a faster model would swing the '
+    assert ('the filter uses 3 of its 8 models ca in azimuth (structure of 8 Hz); a faster model would swing the '
             'structure' in said), said
     assert 'acu.azimuth.structure' not in said and 'acu.elevation.structure.*: the defaults; set them to' in said
 

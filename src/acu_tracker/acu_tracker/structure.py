@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters
     from acu_tracker.params import AcuParameters, AxisParameters
 
-MIN_MARGIN, MIN_FREQUENCY_RATIO = 0.57, 8.0
-"""Smallest margin of a usable model [-], with which the loop amplifies a disturbance by 1.75 at most; smallest ratio
+MIN_MARGIN, MIN_FREQUENCY_RATIO = 1.0 / 1.5, 8.0
+"""Smallest margin of a usable model [-], with which the loop amplifies a disturbance by 1.5 at most; smallest ratio
 of the frequency of the structure to the bandwidth of a usable model [-]."""
 
 SPEED_INTEGRAL_RATIO = 5.0  # ratio of the gains K_p w_s and K_i of the drive's speed loop (tuning.loops) [-]

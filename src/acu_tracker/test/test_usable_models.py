@@ -75,6 +75,25 @@ def test_open_loop_and_stability_are_those_of_two_masses(frequency, share):
         assert margin <= np.abs(1.0 + expected).min() + 0.03
 
 
+@pytest.mark.parametrize('frequency, share', PLANTS)
+def test_the_usable_models_amplify_no_disturbance_above_1_5(frequency, share):
+    """The largest |1 / (1 + k L)| of two masses, for any weight k of the model. The first model that is not usable
+    amplifies more, or is too fast for the structure."""
+    params = parameters(frequency, share, **FAST)
+    imm, receiver = params.azimuth.filter.imm, params.tracker.receiver
+    r = receiver.beamwidth / (receiver.slope * math.sqrt(2.0 * 10.0**(0.1 * receiver.cn0_dbhz)))
+    w = 2.0 * math.pi * frequency * np.geomspace(0.3, 3.0, 1500)
+    usable = structure.rungs_with_margin(params, 'azimuth')
+    for rung, b in enumerate(structure.bandwidths(params.azimuth.filter, receiver)[:usable + 1]):
+        A, B, C = exact(params, imm.ca.noise * imm.rung_ratio**rung, r)
+        L = (C @ np.linalg.solve(1j * w[:, np.newaxis, np.newaxis] * np.eye(11) - A, B))[:, 0, 0]
+        peak = (1.0 / np.abs(1.0 + np.linspace(0.0, 1.0, 101)[:, np.newaxis] * L)).max()
+        if rung < usable:
+            assert peak < 1.5 * 1.03
+        else:
+            assert peak > 1.5 * 0.97 or b > 2.0 * math.pi * frequency / structure.MIN_FREQUENCY_RATIO
+
+
 def rungs(*given, **changes):
     return structure.rungs_with_margin(parameters(*given, **changes), 'azimuth')
 

@@ -28,8 +28,9 @@ def test_a_dish_that_swings_in_gusts_is_no_wrong_slope(place, seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize('place', sorted({name.rpartition('/')[0] for name in study.CASES
-                                          if any(f'/{hz}Hz-{share}-' in name for hz in (6, 8, 20)
-                                                 for share in ('0.1', '0.4'))}))
+                                          if any(f'/{cell}-' in name for cell in (
+                                              *(f'{hz}Hz-{share}' for hz in (6, 8, 20) for share in (0.1, 0.4)),
+                                              '11Hz-0.2', '14Hz-0.1'))}))
 def test_no_cell_is_worse_than_before(place):
     default, before = (np.array([study.tracked(f'{place}/{name}', run) for run in range(2)])
                        for name in ('default', 'before'))
