@@ -144,7 +144,7 @@ def reset(state: State) -> int:
     if cause != annunciator.NO_ALARM:
         return cause
     drive_watch.release(state.unasked, state.frozen, t)
-    monitors.release_divergence(state.tracking.divergence)
+    tracking.release(state.tracking)
     if interruptions.reset_latched(alarms, t) or fault:
         modes.set_pending(state.mode, modes.NO_REQUEST)
         interruptions.cancel_resumption(state.resumption)
@@ -278,9 +278,9 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
                 guidance.bridge_to(state.guidance, state.tracking, constants,
                                    program_track.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
-        if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
-            target.stop(state.tracking.target)
-        tracking.restart(state.tracking)
+        if before == Mode.AUTOTRACK:
+            tracking.end(state.tracking, state.stamp, now.conditions.track)
+        tracking.restart(state.tracking, state.stamp)
     return result, flags
 
 
@@ -410,12 +410,12 @@ def _supervise(state: State, constants: Constants, inputs: Inputs, outputs: Outp
     ship = deck.stabilised != 0 and deck.history.count > 0
     # signal_lost: autotrack has no signal, and no hidden sector, keyhole or turn explains this.
     unexplained = outputs.coasting != 0 and not _outage(state, constants).permitted
-    signal_lost = state.mode.reason == Reason.SIGNAL_LOST or unexplained
+    lost = state.mode.reason == Reason.SIGNAL_LOST or state.mode.reason == Reason.DEPARTED
     attitude_known, _ = attitude.at(deck, params, state.stamp + constants.lead)
     facts = conditions.Facts(
         dt=0.0 if jumped else dt, gap=dt if jumped else 0.0, lost=dt > 1.5 * params.period, latched=latched(state),
         attitude_lost=ship and not attitude_known, attitude_jumped=ship and deck.jump.apart != 0,
-        signal_lost=signal_lost, unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
+        signal_lost=lost or unexplained, unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
     rests = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now)
     mode = Mode.STANDBY if rests else state.mode.now
     conditions.take(state.supervision, mode, inputs, outputs, constants.axis, state.unasked, facts)

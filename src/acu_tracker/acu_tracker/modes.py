@@ -46,7 +46,8 @@ REASON_TEXTS = dict(    # {name of a reason: its text in replies and diagnostics
     PINNED='stow pins not out', PIN_FAILED='stow pin failed', PINS_IN='stow pins in', PINS_OUT='stow pins out',
     NO_ELEMENTS='no elements', TOO_OLD='elements too old', BELOW_HORIZON='below the horizon',
     PROGRAM_GAP='gap in the program track', NO_UTC='UTC unknown', DRIVE_FROZEN='drive frozen',
-    TURN='azimuth turn', NO_POSITION='position of the antenna not given')
+    TURN='azimuth turn', NO_POSITION='position of the antenna not given',
+    DEPARTED='departed from the program')
 REASONS = tuple(REASON_TEXTS.values())  # in the order of their codes
 Reason = codes(REASON_TEXTS)
 

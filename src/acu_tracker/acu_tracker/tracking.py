@@ -3,14 +3,13 @@ import math
 from typing import TYPE_CHECKING
 
 from acu_tracker import signals
-from acu_tracker.estimation import monitors, slope_ratio, target
+from acu_tracker.estimation import departure, monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, frames, history
-from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, dot, line_of_sight, minus, rotated
+from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
-from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
@@ -22,11 +21,6 @@ if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
     from acu_tracker.mode.interruptions import Outage
     from acu_tracker.params import SharedParameters
-
-
-MAX_DEPARTURE_BEAMWIDTHS = 2.0
-"""Largest departure of a coasting estimate from the program [beamwidths]. An estimate that garbled errors have thrown
-does not know this, and its sigma stays small."""
 
 
 class Tracking(Record):
@@ -42,11 +36,13 @@ class Tracking(Record):
     divergence: monitors.Divergence
     wrong_slope: monitors.WrongSlope
     slope_ratio: slope_ratio.SlopeRatio
+    departure: departure.Departure
 
 
 def initialise(tracking: Records, pointing: PointingParameters) -> None:
     """Begin without an estimate."""
     target.initialise(tracking['target'])
+    departure.initialise(tracking['departure'])
     model.initialise(tracking['pointing'][0], pointing.terms, pointing.named)
 
 
@@ -103,19 +99,40 @@ def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Out
     # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = constants.p.tracker, not gap.permitted, tracking.target.running
     lost = not running or (unexplained and gap.since > p.coast_time)
+    departed = False
     if running and unexplained and gap.coasting:
-        lost |= leaves_beam(spread(tracking, constants, t), departure(tracking, constants, program, t),
-                            p.receiver.beamwidth)
+        lost |= leaves_beam(spread(tracking, constants, t),
+                            departure.in_coast(tracking.target, constants, program, t), p.receiver.beamwidth)
+    elif running and unexplained and closed:
+        departed = departure.departed(tracking.departure, tracking.target, constants, program, t)
     if tracking.divergence.diverged or (
-            closed and monitors.diverges(tracking.divergence, gap.coasting and unexplained)):
+            closed and monitors.diverges(tracking.divergence, departed or (gap.coasting and unexplained))):
         return Reason.DIVERGED, Reason.DIVERGED, Reason.DIVERGED
     lock = Reason.NONE if target.locked(tracking.target, p, gap.since) else Reason.NOT_LOCKED
-    return lock, Reason.NONE, Reason.SIGNAL_LOST if lost else Reason.NONE
+    return lock, Reason.NONE, Reason.DEPARTED if departed else Reason.SIGNAL_LOST if lost else Reason.NONE
 
 
 @compiled
-def restart(tracking: Tracking) -> None:
-    """Restart the monitors of divergence and slope when a mode begins."""
+def end(tracking: Tracking, t: Seconds, reason: int) -> None:
+    """End autotrack at t. reason: why the target was lost, or Reason.NONE. Discard the estimate of a lost target, and
+    latch the divergence if autotrack has departed from the program repeatedly."""
+    if reason != Reason.NONE:
+        target.stop(tracking.target)
+    if departure.note_end(tracking.departure, t, reason == Reason.DEPARTED):
+        monitors.latch_divergence(tracking.divergence)
+
+
+@compiled
+def release(tracking: Tracking) -> None:
+    """Reset the latched divergence."""
+    departure.release(tracking.departure)
+    monitors.release_divergence(tracking.divergence)
+
+
+@compiled
+def restart(tracking: Tracking, t: Seconds) -> None:
+    """Restart the monitors of divergence, slope and departure when a mode begins at t."""
+    departure.restart(tracking.departure, t)
     monitors.restart_divergence(tracking.divergence)
     monitors.restart_slope(tracking.wrong_slope)
     slope_ratio.restart(tracking.slope_ratio)
@@ -137,28 +154,10 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 
 
 @compiled
-def departure(tracking: Tracking, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Radians:
-    """Return how far the estimate has departed from the program since the last accepted measurement, 0 without a
-    program at one of the two times. A program that was further off than MAX_DEPARTURE_BEAMWIDTHS before, such as the
-    plan of an aircraft that flies another way, is no reference: 0."""
-    before = tracking.target.stamp
-    if program_track.status(program, t) != Reason.NONE or program_track.status(program, before) != Reason.NONE:
-        return 0.0
-    u, v = sight(tracking, constants, t).u, sight(tracking, constants, before).u
-    p, q = (line_of_sight(program_track.motion_at(program, t)).u,
-            line_of_sight(program_track.motion_at(program, before)).u)
-    off = minus(v, q)
-    if math.sqrt(dot(off, off)) > MAX_DEPARTURE_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth:
-        return 0.0
-    gone = minus(minus(u, p), off)
-    return math.sqrt(dot(gone, gone))
-
-
-@compiled
 def leaves_beam(sigma: Radians, departed: Radians, beamwidth: Radians) -> bool:
     """Return True if a coast has become useless: sigma of the estimate is above half a beamwidth, or the estimate has
-    departed from the program by more than MAX_DEPARTURE_BEAMWIDTHS."""
-    return sigma > 0.5 * beamwidth or departed > MAX_DEPARTURE_BEAMWIDTHS * beamwidth
+    departed from the program by more than departure.MAX_OFFSET_BEAMWIDTHS."""
+    return sigma > 0.5 * beamwidth or departed > departure.MAX_OFFSET_BEAMWIDTHS * beamwidth
 
 
 @compiled

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker import tracking
+from acu_tracker.estimation import departure
 from acu_tracker.search import judgement
 
 B = 0.0175
@@ -85,6 +86,6 @@ def test_expected_level():
 def test_coast():
     assert tracking.sigma_across(4e-6, 1e-6, math.acos(0.25)) == pytest.approx(1e-3)
     assert tracking.sigma_across(4e-6, 1e-6, 0.0) == pytest.approx(2e-3)
-    departed = tracking.MAX_DEPARTURE_BEAMWIDTHS * B
+    departed = departure.MAX_OFFSET_BEAMWIDTHS * B
     assert not tracking.leaves_beam(0.49 * B, 0.99 * departed, B)
     assert tracking.leaves_beam(0.51 * B, 0.0, B) and tracking.leaves_beam(0.0, 1.01 * departed, B)

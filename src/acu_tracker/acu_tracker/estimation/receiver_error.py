@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from acu_tracker import signals
-from acu_tracker.estimation import monitors, slope_ratio, target
+from acu_tracker.estimation import departure, monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import (
     NO_INNOVATION,
@@ -148,6 +148,8 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
             _follow_with_frame(tracking.target, constants.target)
         if outcome != OUTCOME_NOISY and counts:
             monitors.take_divergence(tracking.divergence, innovation, measurement, tracking.target.roughness.q)
+    departure.take_level(tracking.departure, tracking.target, constants, loop.program, loop.closed and loop.follows,
+                         inputs.error_stamp, inputs.cn0_dbhz)
     if loop.closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
         _watch_slope(tracking, constants, inputs, at, deck.mat, loop.program)
     return _write_innovation(outputs, outcome, innovation)

@@ -63,8 +63,9 @@ MODE_ROWS = (
         'receiver locked, filter converged',
         'to the chosen fallback after `coast_time` without an accepted receiver error, when the uncertainty of the '
         'estimate reaches half a beamwidth, or when the coasting estimate departs from the program by two beamwidths; '
-        'after divergence back to the predicted track that was followed last (`program`, `tle` or `sun`); to '
-        '`acquire` in a side lobe; to `standby` if the next mode cannot be entered',
+        'after divergence, or after a departure from the program while the level falls, back to the predicted track '
+        'that was followed last (`program`, `tle` or `sun`); to `acquire` in a side lobe; to `standby` if the next '
+        'mode cannot be entered',
         needs='lock', ends='track', follows=True, fallback='program'),
     Row('search', 'search around the expected place of the target in three stages: last place, small area, full area',
         'refused while the alarm `diverged` is latched',
