@@ -5,6 +5,7 @@ import pytest
 from oracles import van_loan
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from acu_tracker.estimation.filters import axis_filter, kalman
 from acu_tracker.estimation.filters.kalman import Symmetric
@@ -290,6 +291,59 @@ def test_a_swing_below_the_noise_shows_in_the_stated_covariance(frequency):
         assert np.mean(bank) < 1.3 < np.mean(stated) < 2.4
 
 
+@pytest.mark.parametrize('lag', [2.0, 4.0, 8.0])
+def test_the_lag_of_a_steady_filter_is_stated(lag):
+    """Exact angles of a target whose acceleration grows steadily. In the steady state the filter learns the growth j T
+    of the acceleration from every innovation nu, so that k3 nu = j T with the gain of the Riccati equation. lag: nu
+    over the standard deviation of the estimate."""
+    phi, Q = discrete('ca', T)
+    H = np.array([[1.0, 0.0, 0.0]])
+    P = solve_discrete_are(phi.T, H.T, Q, [[SIGMA**2]])
+    gain = P[:, 0] / (P[0, 0] + SIGMA**2)
+    P -= np.outer(gain, P[0])
+    nu = lag * math.sqrt(P[0, 0])
+    jerk = gain[2] * nu / T
+    # The error e after a measurement solves e = (1 - gain H) (phi e + jerk (T^3 / 6, T^2 / 2, T)).
+    left = np.eye(3) - np.outer(gain, H)
+    e = np.linalg.solve(np.eye(3) - left @ phi, left @ (jerk * np.array([T**3 / 6.0, T**2 / 2.0, T])))
+    t = T * np.arange(6000)
+    row = run(t, jerk * t**3 / 6.0, kind='ca', **PARAMS)[-1]
+    assert row['innovation'] == pytest.approx(nu, rel=1e-3)
+    assert row['angle'] == pytest.approx(jerk * t[-1]**3 / 6.0 - e[0], abs=1e-3 * abs(e[0]))
+    stated = np.array([[row['variance'], row['covariance']], [row['covariance'], row['rate_variance']]])
+    assert e[:2] @ np.linalg.solve(stated, e[:2]) + np.trace(np.linalg.solve(stated, P[:2, :2])) < 2.4
+
+
+def test_a_jump_is_stated_before_the_bank_follows_it_and_chance_seldom_is():
+    """An acceleration that begins after a minute at rest: 0.3 s later the stated sigma of the rate has grown tenfold.
+    At rest the short mean passes MIN_JUMP more rarely than a chi-square number, because its variance is measured."""
+    t = T * np.arange(6100)
+    after = np.maximum(t - 60.0, 0.0)
+    out = run(t, noisy(0.5 * 10.0 * DEG * after**2), kind='imm')
+    before, at = out['rate_variance'][5000:6000].mean(), out['rate_variance'][6010:6030].max()
+    assert at > 100.0 * before
+    calm = run(T * np.arange(60_000), noisy(np.zeros(60_000)), kind='ca', **{'ca.noise': 1e-5})[6000:]
+    added = calm['variance'] / calm['of_bank'][:, 0] - calm['covariance'] / calm['of_bank'][:, 1]
+    assert 0.001 < np.mean(added > 0.1) < chi2.sf(axis_filter.MIN_JUMP, 1)
+
+
+@pytest.mark.parametrize(('best', 'probability'), [(0, 1e-3), (0, 0.02), (1, 0.02), (1, 0.3), (2, 0.3)])
+def test_the_variance_of_the_next_model_is_stated_if_it_is_possible(best, probability):
+    """Three models, of which the last has no next one; a second measurement at the time of the first changes none."""
+    c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'imm.rungs': 2}))[0]
+    f = axis_filter.Filter.zeros()[0]
+    axis_filter.start(f, c, 0.0, SIGMA**2, 0.1)
+    f['mu'][:3] = np.roll((1.0 - 1.25 * probability, probability, 0.25 * probability), best)
+    f['p'][:3, 0] = np.array([1e-3, 4e-3, 9e-3]) * SIGMA**2
+    axis_filter.join(f)
+    axis_filter.predict(f, c, 0.0)
+    axis_filter.correct(f, c, AxisMeasurement(0.0, 1e12 * SIGMA**2, math.nan, 1.0))
+    of_next = f['p'][min(best + 1, 2), 0]
+    share = min(f['mu'][min(best + 1, 2)] / axis_filter.CERTAIN_DOUBT, 1.0)
+    expected = (1.0 - share) * f['bank_p'][0] + share * max(of_next, f['bank_p'][0])
+    assert axis_filter.variances(f, axis_filter.corrected(f)).p11 == pytest.approx(expected, rel=1e-3)
+
+
 @pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
     t = T * np.arange(400)
@@ -385,7 +439,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     c = axis_filter.constants(build(FilterParameters, {'kind': 'imm', 'imm.models': 'cv ca', 'imm.rungs': 1,
                                              'imm.cv.noise': 1e-2, 'imm.ca.noise': 3e-2, 'imm.dwell': dwell}))[0]
     f, rng = axis_filter.Filter.zeros()[0], np.random.default_rng(9)
-    f['count'], f['mu'][:2], f['calm'] = 2, (0.3, 0.7), 1.0
+    f['count'], f['mu'][:2], f['calm'], f['doubt'] = 2, (0.3, 0.7), 1.0, 1.0
     f['x'][:2] = (1.0, 0.2, 0.0), (1.002, 0.21, 0.03)
     f['p'][:2] = (1e-6, 1e-7, 0, 1e-4, 0, 0), (4e-6, 1e-6, 0, 2e-4, 1e-5, 1e-4)
     axis_filter.join(f)

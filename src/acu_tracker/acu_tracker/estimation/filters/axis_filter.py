@@ -41,14 +41,14 @@ if TYPE_CHECKING:
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
-TREND_MEMORY = 1.5
+TREND_MEMORY = 2.5
 """Memory of the mean innovation over that of the filter [-]. A short one shows a lag soon, a long one a small lag."""
 
 MIN_LAG, LAG_GAIN = 2.0, 2.0
 """Largest square of the mean innovation that counts as chance, over its variance in a consistent filter; square of a
 growing lag over the square of its mean [-]."""
 
-CALM_TIME_S, CALM_MEMORIES = 20.0, 7.0
+CALM_TIME_S, CALM_MEMORIES = 20.0, 12.0
 """Memory of `calm`: the longer of this time, and of this number of memories of the filter."""
 
 MIN_CALM = 0.5
@@ -60,7 +60,13 @@ MIN_SWING, MAX_SWING = 1.14, 40.0
 """Smallest and largest counted square of the short mean, over the variance that white innovations give it [-]. The
 first is the mean of white innovations plus two standard deviations."""
 
-MAX_INFLATION = 100.0  # largest factor of the stated variances [-]
+MIN_JUMP = 5.0  # largest square of the short mean that counts as chance, over its variance [-]
+
+CERTAIN_DOUBT = 0.05
+"""Probability of the next model from which its variance is stated. The bank prefers the quieter of two models while
+noise hides its lag. No innovation then shows this lag."""
+
+MAX_INFLATION = 1e4  # largest factor of the stated variances [-]
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')  # columns in `p`
 
@@ -107,6 +113,9 @@ class Filter(Record):
     short: Radians          # mean of the innovations of the last SWING_TIME_S
     short_variance: Radians2    # its variance if the innovations are white
     swing: Radians2         # mean square of an error that swings about 0; below 0: none is seen
+    # variance of the angle in the model after the most probable one, over that of the bank, as far as this model is
+    # possible; at least 1 [-]
+    doubt: float
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
     # attitude error (estimation/receiver_error.py)
     drift_variance_rate: float
@@ -192,7 +201,7 @@ def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sig
     _reset_acceleration_variance(state, constants)
     state.last_angle, state.correlated = y, 1
     state.trend = state.trend_variance = state.short = state.short_variance = state.swing = 0.0
-    state.calm = 1.0
+    state.calm = state.doubt = 1.0
 
 
 @compiled
@@ -276,16 +285,18 @@ def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
     The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
     innovations have the mean b. Above chance, b^2 is added to the variance of the angle, and in proportion to the
     others. The bank also expects more motion than a calm target makes, and the mean is then smaller than expected:
-    `calm` is its mean square over the expected one. Only this part of the variances is stated.
+    `calm` is its mean square over the expected one. Only this part of the variances is stated, times `doubt`.
 
-    A target may also swing by less than the noise of a filter that would follow it, or jump. The bank is then right
-    not to follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`.
-    Because such a b changes within SWING_TIME_S, the rate has the error b / SWING_TIME_S."""
+    A target may also jump, or swing by less than the noise of a filter that would follow it. The bank is then right
+    not to follow, and the mean of b over its memory is about 0. A short mean shows the jump, and its mean square the
+    swing: `swing`. Because an acceleration made such a b within SWING_TIME_S, the rate has the error 2 b /
+    SWING_TIME_S."""
     lag = max(state.trend * state.trend - MIN_LAG * state.trend_variance, 0.0)
-    factor = min(max(min(state.calm, 1.0), MIN_CALM) + LAG_GAIN * lag / state.bank_p[P11_COLUMN], MAX_INFLATION)
-    P, swing = gaussian.P, max(state.swing, 0.0)
+    factor = min(state.doubt * max(min(state.calm, 1.0), MIN_CALM) + LAG_GAIN * lag / state.bank_p[P11_COLUMN],
+                 MAX_INFLATION)
+    P, swing = gaussian.P, max(state.swing, state.short * state.short - MIN_JUMP * state.short_variance, 0.0)
     return AxisVariances(factor * P.p11 + min(swing, MAX_INFLATION * P.p11), factor * P.p12, factor * P.p22
-                         + min(swing / (SWING_TIME_S * SWING_TIME_S), MAX_INFLATION * P.p22))
+                         + min(4.0 * swing / (SWING_TIME_S * SWING_TIME_S), MAX_INFLATION * P.p22))
 
 
 @compiled
@@ -355,6 +366,7 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
     state.last_angle, state.correlated = measurement.angle, 1
     _take_innovation(state, nu_mean, nu_square - nu_mean * nu_mean, own)
     _take_swing(state, nu_mean / (1.0 - rho))
+    _take_doubt(state)
 
 
 @compiled
@@ -376,6 +388,18 @@ def _take_swing(state: Filter, nu: Radians) -> None:
     state.short_variance = (1.0 - gain) * (1.0 - gain) * state.short_variance + gain * gain * nu * nu
     excess = min(state.short * state.short, MAX_SWING * state.short_variance) - MIN_SWING * state.short_variance
     state.swing += share * (excess - state.swing)
+
+
+@compiled
+def _take_doubt(state: Filter) -> None:
+    """Set the doubt after a correction."""
+    best = 0
+    for j in range(1, state.count):
+        if state.mu[j] > state.mu[best]:
+            best = j
+    following = min(best + 1, state.count - 1)
+    more = state.p[following, P11_COLUMN] / state.bank_p[P11_COLUMN] - 1.0
+    state.doubt = 1.0 + min(state.mu[following] / CERTAIN_DOUBT, 1.0) * max(more, 0.0)
 
 
 @compiled

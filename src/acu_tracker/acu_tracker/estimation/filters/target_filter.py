@@ -19,9 +19,15 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from acu_tracker.estimation.filters import axis_filter, unscented
-from acu_tracker.estimation.filters.kalman import Gaussian
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
-from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
+from acu_tracker.estimation.filters.measurement import (
+    AxisInnovation,
+    AxisVariances,
+    Estimate,
+    Innovation,
+    Measurement,
+    with_rate,
+)
 from acu_tracker.geometry.vector import (
     AxisMotion,
     Motion,
@@ -161,7 +167,11 @@ def outlook(state: Filter, constants: Constants, T: Seconds) -> Motion:
 @compiled
 def read(state: Filter) -> Estimate:
     """Return the Estimate at the instant of the last `predict`."""
-    axes = read_axes(state)
+    return _with_cartesian(state, read_axes(state))
+
+
+@compiled
+def _with_cartesian(state: Filter, axes: Estimate) -> Estimate:
     if not (state.used[0] or state.used[1]):
         return axes
     own, (cartesian, _) = axes.variances, unscented.variances(state.cartesian)
@@ -171,24 +181,25 @@ def read(state: Filter) -> Estimate:
 
 @compiled
 def read_corrected(state: Filter, constants: Constants) -> Estimate:
-    """Return the Estimate at the last measurement."""
+    """Return the Estimate at the last measurement, with the variances of the banks. Decisions use them, because what
+    the filter states must not change what it estimates."""
     if state.running:
         predict(state, constants, 0.0)
-        return read(state)
-    azimuth, elevation = axis_filter.corrected(state.axis[0]), axis_filter.corrected(state.axis[1])
-    return _of_axes(state, azimuth, elevation)
+    return _with_cartesian(state, _of_banks(state))
 
 
 @compiled
 def read_axes(state: Filter) -> Estimate:
     """Return the Estimate of the axis filters alone, at the instant of their last `predict`."""
-    return _of_axes(state, axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1]))
+    azimuth, elevation = axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1])
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(state.axis[0], azimuth),
+                                                     axis_filter.variances(state.axis[1], elevation)))
 
 
 @compiled
-def _of_axes(state: Filter, azimuth: Gaussian, elevation: Gaussian) -> Estimate:
-    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(state.axis[0], azimuth),
-                                                     axis_filter.variances(state.axis[1], elevation)))
+def _of_banks(state: Filter) -> Estimate:
+    (a, A), (e, E) = axis_filter.corrected(state.axis[0]), axis_filter.corrected(state.axis[1])
+    return Estimate(Motion(a, e), (AxisVariances(A.p11, A.p12, A.p22), AxisVariances(E.p11, E.p12, E.p22)))
 
 
 @compiled
@@ -222,8 +233,7 @@ def select(state: Filter, constants: Constants, measurement: Measurement) -> Non
             state.running = 0
     elif ((constants.wanted[0] or constants.wanted[1])
           and measurement.range_variance <= constants.range_share_2 * measurement.range * measurement.range):
-        predict(state, constants, 0.0)
-        unscented.start(state.cartesian, constants.cartesian, read_axes(state), measurement.range,
+        unscented.start(state.cartesian, constants.cartesian, _of_banks(state), measurement.range,
                         measurement.range_variance)
         state.running, state.predicted = 1, math.nan
 
@@ -234,7 +244,7 @@ def _use_cartesian(state: Filter, constants: Constants) -> None:
     if (state.used[0] or not constants.wanted[0]) and (state.used[1] or not constants.wanted[1]):
         return
     predict(state, constants, 0.0)
-    axes, (cartesian, _) = read_axes(state).variances, unscented.variances(state.cartesian)
+    axes, (cartesian, _) = _of_banks(state).variances, unscented.variances(state.cartesian)
     for i in range(2):
         if constants.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
             state.used[i] = 1
