@@ -114,6 +114,23 @@ def test_a_filter_turns_with_its_frame():
     np.testing.assert_allclose([v.p11 for v in turned.variances], expected, rtol=0.03)
 
 
+@pytest.mark.parametrize('degrees', [0.0, 30.0, 90.0])
+def test_the_probabilities_of_the_models_turn_with_the_frame(degrees):
+    """About a line of sight to the north: after 90 deg each axis has the models of the other one."""
+    c = target_filter.constants(UkfParameters(), (FilterParameters(), FilterParameters()), 0.0)[0]
+    f = target_filter.Filter.zeros()[0]
+    axis = AxisMeasurement(0.0, 1e-8, math.nan, math.nan)
+    target_filter.start(f, c, Measurement(0.0, (axis, axis), math.nan, math.nan), 0.1)
+    before = np.random.default_rng(1).dirichlet(np.ones(f['axis'][0]['count']), 2)
+    for i in range(2):
+        f['axis'][i]['mu'][:before.shape[1]] = before[i]
+    matrix = Rotation.from_rotvec([0.0, math.radians(degrees), 0.0]).as_matrix()
+    target_filter.turn(f, c, rotation(matrix))
+    share = math.cos(math.radians(degrees))**2
+    np.testing.assert_allclose(f['axis']['mu'][:, :before.shape[1]], share * before + (1.0 - share) * before[::-1],
+                               atol=1e-12)
+
+
 def test_the_bridge_is_the_program_turned_to_the_target():
     times = np.arange(0.0, 40.0)
     program = ProgramTrack(times, np.column_stack((0.5 + 0.03 * times, 0.4 + 0.01 * times)))

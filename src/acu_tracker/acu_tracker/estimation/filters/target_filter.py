@@ -284,7 +284,8 @@ def turn(state: Filter, constants: Constants, rotation: Rotation) -> None:
 
     The direction of growing azimuth turns by an angle phi against the old one. Across the line of sight the variance
     of an axis becomes cos2(phi) of its own and sin2(phi) of the variance of the other axis, because the errors of both
-    axes are independent. The variance of an azimuth is that across the line of sight over cos2(elevation).
+    axes are independent. The variance of an azimuth is that across the line of sight over cos2(elevation). The
+    probabilities of the models turn likewise, because an acceleration belongs to a direction and not to an axis.
     """
     azimuth, elevation = axis_filter.corrected(state.axis[0]), axis_filter.corrected(state.axis[1])
     motion = earth_angles(turned(rotation, line_of_sight(Motion(azimuth.x, elevation.x))))
@@ -295,6 +296,11 @@ def turn(state: Filter, constants: Constants, rotation: Rotation) -> None:
     own = cos2 * scale * per_scale, cos2
     share = (1.0 - cos2) * per_scale, (1.0 - cos2) * scale
     others = elevation.P, azimuth.P
+    if state.axis[0].bank == state.axis[1].bank:
+        for j in range(state.axis[0].count):
+            mu = state.axis[0].mu[j], state.axis[1].mu[j]
+            for i in range(2):
+                state.axis[i].mu[j] = cos2 * mu[i] + (1.0 - cos2) * mu[1 - i]
     for i in range(2):
         axis_filter.move(state.axis[i], constants.axis[i], motion[i])
         axis_filter.blend(state.axis[i], constants.axis[i], own[i], share[i], others[i])
