@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from acu_tracker.estimation import monitors
+from acu_tracker.alarms.table import ALARM_ROWS
+from acu_tracker.estimation import departure, monitors
 from acu_tracker.estimation.filters.measurement import (
     NO_INNOVATION,
     AxisInnovation,
@@ -85,3 +86,12 @@ def test_a_filter_that_follows_badly_since_long_has_not_diverged(state, usual, l
     for _ in range(500):
         take(state, innovation(usual))
     assert not monitors.diverges(state, True)
+
+
+def test_the_text_of_the_alarm_states_the_limits():
+    meaning = next(row.meaning for row in ALARM_ROWS if row.name == 'diverged')
+    for text in (f'mean of the last {monitors.DIVERGENCE_ERROR_COUNT} squared',
+                 f'exceeds {monitors.DIVERGENCE_LIMIT:g},',
+                 f'mean of the last {monitors.SHORT_ERROR_COUNT} exceeds {monitors.COASTING_GROWTH_LIMIT:g} times',
+                 f'that of the last {monitors.LONG_ERROR_COUNT},', f'within {departure.HOLD_TIME_S:g} s of its lock'):
+        assert text in meaning

@@ -132,9 +132,9 @@ ALARM_ROWS = (
           ('INS lost', '* encoder jump', '* encoder stuck', '* encoder disagreement', '* immobile',
            '* following error'),
           'the estimate departs from the target. In autotrack the mean of the last 100 squared innovations, divided '
-          'by their variance, exceeds 7, or at a loss of signal the mean of the last 50 exceeds 1.75 times that of '
+          'by their variance, exceeds 8, or at a loss of signal the mean of the last 50 exceeds 1.75 times that of '
           'the last 1000, or the receiver errors move with the beam as with a reversed sign or turned axes, or '
-          'autotrack has departed from the program twice, each time within 10 s of its lock. The ACU enters '
+          'autotrack has departed from the program twice, the second time within 10 s of its lock. The ACU enters '
           '`program`, or `standby` without a program, and refuses autotrack until a reset of the alarm',
           "check slope, phase and sign of the receiver's error signals; then reset the alarm"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
