@@ -56,7 +56,7 @@ def test_a_weak_slope_of_the_wrong_sign_is_left_soon_and_then_is_an_alarm(name, 
 
 
 @pytest.mark.parametrize('fallback', ['coast', 'search', 'standby'])
-def test_it_is_told_with_every_fallback(fallback):
+def test_the_alarm_comes_with_every_fallback(fallback):
     run, reasons, off = turned_over('square', 2, {'acu.fallback': fallback})
     assert off < 2.0 and run.units['acu'].faults == ('diverged',) and run['acu/mode'][-1] == Mode.PROGRAM
 
@@ -70,7 +70,7 @@ def test_a_reset_while_the_slope_is_still_wrong_is_followed_by_the_same_verdict(
 @pytest.mark.thorough
 @pytest.mark.parametrize('name', ['uav_flyby', 'ship_pass', 'uav_tracker_3m', 'station_real', 'quadcopter', 'square',
                                   'leo_station_7m'])
-def test_a_weak_slope_of_the_wrong_sign_is_told_at_any_time(name):
+def test_a_weak_slope_of_the_wrong_sign_is_an_alarm_at_any_time(name):
     for seed in range(11, 21):
         run, _, off = turned_over(name, seed)
         assert off < 2.0 and run.units['acu'].faults == ('diverged',), seed

@@ -6,19 +6,21 @@ import pytest
 from acu_tracker.estimation import departure
 
 START, ELEVATION, CN0 = 4.0, 0.6, 46.0
-JERK = 3.0
+JERK = 2.0
 """Of the target from START on, across the line of sight [rad/s3]; the program stays behind."""
 B = 0.0175  # beamwidth [rad]
+SIGMA = 5e-4  # noise of an error at CN0 [rad]
+MAX_FALL = 10.75  # largest fall of the level [dB]
 
 
 def leave(Rig, delay, fall=43.0, offset=0.0, **parameters):
     """(rig, distance between target and program [beamwidths]) after a target that is tracked has left its program, or
-    after a second. The level falls by `fall` dB/s, from `delay` s after START on; offset: error of the program before
-    [beamwidths]."""
+    after a second. From `delay` s after START on the level falls by `fall` dB/s, in all by MAX_FALL; offset: error of
+    the program before [beamwidths]."""
     def target(t):
         s = max(t - START, 0.0)
         return 0.5 + JERK * s**3 / 6.0 / math.cos(ELEVATION), ELEVATION
-    rig = Rig(target, at=(0.5, ELEVATION), initial_mode='program', sigma=5e-4, **parameters)
+    rig = Rig(target, at=(0.5, ELEVATION), initial_mode='program', sigma=SIGMA, **parameters)
     rig.program(target=lambda t: (0.5, ELEVATION + offset * B))
     rig.run(START, cn0_dbhz=CN0)
     assert rig.mode == 'autotrack'
@@ -26,7 +28,9 @@ def leave(Rig, delay, fall=43.0, offset=0.0, **parameters):
     while rig.mode == 'autotrack' and rig.k * rig.T < START + 1.0:
         t = rig.k * rig.T - START
         gone = JERK * t**3 / 6.0 / B
-        rig.step(cn0_dbhz=CN0 - fall * min(max(t - delay, 0.0), 0.25))
+        drop = min(fall * max(t - delay, 0.0), MAX_FALL)
+        rig.sigma = SIGMA * 10.0**(0.05 * drop)
+        rig.step(cn0_dbhz=CN0 - drop)
     return rig, gone
 
 
@@ -41,11 +45,11 @@ def test_a_beam_that_moves_before_its_level_falls_has_left_its_target(Rig):
     assert GONE + departure.MAX_BEAMWIDTHS < gone < GONE + departure.MAX_BEAMWIDTHS + 0.7
 
 
-@pytest.mark.parametrize('delay, fall, offset', [(0.0, 43.0, 0.0), (LATE_S, 4.0, 0.0), (LATE_S, 43.0, 3.1)],
+@pytest.mark.parametrize('delay, fall, offset', [(0.0, 43.0, 0.0), (LATE_S, 5.9, 0.0), (LATE_S, 43.0, 3.1)],
                          ids=['the level falls first', 'the level falls slowly', 'the program was wrong before'])
 def test_the_target_is_tracked_on(Rig, delay, fall, offset):
     rig, gone = leave(Rig, delay, fall, offset)
-    assert (rig.mode, rig.reason) == ('autotrack', 'locked') and gone > 20.0
+    assert (rig.mode, rig.reason) == ('autotrack', 'locked') and gone > 18.0
 
 
 @pytest.mark.parametrize('fallback', ['coast', 'search', 'preset'])
