@@ -1,4 +1,4 @@
-"""The departure of the estimate from the program: it distinguishes errors that lead the beam away from a fade.
+"""The departure of the estimate from the program: it distinguishes wrong errors from a fade.
 
 A receiver whose errors are too small and have the wrong sign drives the beam away, and no error is ever large. Behind
 the beam the errors are noise, or those of a side lobe. The filter accepts them for 0.2 s, because the gain of the
@@ -7,16 +7,17 @@ receiver follows its level late, and makes the noise small. In this time the bea
 The level falls in a fade too. The two differ in what comes first, if the program was right before:
 
     o       offset: direction of the estimate less that of the program, ENU unit vectors
-    d       |o - o_f|, o_f: offset when the level began to fall, by FALL_DB below its highest value of late
+    d       |o - o_f|, o_f: offset when the level began to fall, by FALL_DB below its recent maximum
 
 A beam that leaves its target has moved before its level is low: in closed loops d was mostly 0.5 to 0.7 beamwidths at
 a drop of LOW_DB. In a fade the level comes first, and d was mostly below 0.3 beamwidths, also on targets that turned
 at that moment. If d is above MIN_FIRST_BEAMWIDTHS at this drop, autotrack ends as soon as d reaches MAX_BEAMWIDTHS.
-After MAX_COUNT such ends, none later than HOLD_TIME_S after its lock, the errors count as wrong (alarm `diverged`).
+After MAX_COUNT such ends in succession the errors count as wrong (alarm `diverged`). Autotrack of more than
+HOLD_TIME_S begins a new succession, of which its own end is the first.
 
-A program that is further off than MAX_OFFSET_BEAMWIDTHS is no reference, such as the plan of an aircraft that flies
-another way. A level that falls already when autotrack begins shows nothing, because the target is at the edge of the
-beam.
+A program that is further off than MAX_FALL_OFFSET_BEAMWIDTHS at the begin of the fall is no reference, such as the
+plan of an aircraft that flies another way. A level that falls already when autotrack begins shows nothing, because the
+target is at the edge of the beam.
 """
 import math
 from typing import TYPE_CHECKING
@@ -39,30 +40,31 @@ if TYPE_CHECKING:
 class Departure(Record):
     """State of the watch."""
     stamp: Seconds          # time of the last error
-    level: DecibelHertz     # highest C/N0 of late
+    level: DecibelHertz     # recent maximum of the C/N0
     drop: float             # level less the last C/N0 [dB]
     offset: Vector3         # o_f [-]; NaN in x: no reference
     begun: Seconds          # begin of the mode
-    count: int              # number of ends of autotrack by a departure, each soon after its lock
+    count: int              # number of successive ends of autotrack by a departure
 
 
 FORGETTING_DB_PER_S = 6.0
-"""Rate at which the highest level is forgotten [dB/s]. The level of an aircraft that flies away falls more slowly."""
+"""Rate at which the maximum of the level is forgotten [dB/s]. The level of an aircraft that flies away falls more
+slowly."""
 
 FALL_DB, LOW_DB = 0.5, 3.0  # drops of the level with which its fall begins, and with which it is low [dB]
 MIN_FIRST_BEAMWIDTHS = 0.35  # least d when the level becomes low [beamwidths]
 MAX_BEAMWIDTHS = 1.0        # largest d of a low level in autotrack [beamwidths]
 
 MAX_OFFSET_BEAMWIDTHS = 2.0
-"""Largest offset of a program that is a reference, and largest departure in a coast [beamwidths]. An estimate that
-garbled errors have thrown does not know this, and its sigma stays small."""
+"""Largest offset of a program that is a reference in a coast, and largest departure in a coast [beamwidths]. The sigma
+of an estimate that garbled errors have thrown stays small."""
 
 MAX_FALL_OFFSET_BEAMWIDTHS = 3.0
 """Largest offset of a program that is a reference when the level begins to fall [beamwidths]. By then a wrong estimate
 is already one beamwidth off."""
 
-HOLD_TIME_S = 10.0  # time of autotrack that ends a succession of departures [s]
-MAX_COUNT = 2       # number of successive departures that shows wrong errors
+HOLD_TIME_S = 10.0  # longest autotrack that continues a succession of departures [s]
+MAX_COUNT = 2       # number of successive departures that show wrong errors
 
 
 def initialise(record: Records) -> None:
@@ -104,7 +106,7 @@ def in_coast(target_: Target, constants: 'Constants', program: ProgramTrack, t: 
 @compiled
 def _beyond(state: Departure, target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds,
             beamwidths: float) -> bool:
-    """Return True if d is larger than some beamwidths at t."""
+    """Return True if d is larger than a number of beamwidths at t; False without a reference or a program."""
     gone = minus(_offset(target_, constants, program, t), vector(state.offset))
     return _length(gone) > beamwidths * constants.p.tracker.receiver.beamwidth
 

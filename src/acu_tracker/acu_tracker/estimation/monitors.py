@@ -55,8 +55,9 @@ smallest J' has a closed form. With a_x + i a_e, b_x + i b_e and C = mean of (b 
 Right slope: the beam is H z, so that z' = (2 H - 1) z for a reversed sign. H is the transfer function of the closed
 loop. The best prediction of z' has larger errors than that of z, because 2 H - 1 has zeros in the right half-plane:
 the poles of the loop with the reversed sign. Therefore z' is only smoother for a while, after the target has turned.
-Outliers and noise are in both directions alike. With small errors z' is so noisy that J' is still smaller than J by
-|g|^2 while the beam follows a target that turns slowly. This hypothesis needs a larger ratio of J and J'.
+Outliers and noise are in both directions alike. With small errors z' is noisy. In units of this noise J' may
+be as small as |g|^2 J while the beam follows a target that turns slowly. Therefore this hypothesis needs a larger
+ratio of J and J'.
 
 Wrong slope: the errors drive the beam away from the target. The direction z' stays smooth, and z moves away twice as
 fast as the beam.
@@ -143,7 +144,8 @@ def take_divergence(state: Divergence, innovation: Innovation, measurement: Meas
 
 @compiled
 def diverges(state: Divergence, without_signal: Bit) -> bool:
-    """Return True if the filter has diverged; without_signal: it coasts without a known cause of the loss."""
+    """Return True if the filter has diverged; without_signal: it coasts without a known cause of the
+    loss, or departs from the program."""
     return state.m > DIVERGENCE_LIMIT or without_signal != 0 and state.g > COASTING_GROWTH_LIMIT
 
 
@@ -269,8 +271,8 @@ the filter follows the target that seems to flee.
 """
 
 SMALL_SLOPE_RATIO, SMALL_SLOPE_MARGIN, SMALL_SLOPE_EXPLAINED, SMALL_LEAVING_SHARE = 20.0, 6.0, 0.9, 0.4
-"""The first three limits for the hypothesis of SMALL_SLOPE [-], which needs a ratio above SMALL_SLOPE^-2. Without the
-margin the same loops and targets reached 2.5, also with all kinds of filter. Only a target that leaves the beam is
+"""The first three limits for the hypothesis of SMALL_SLOPE [-], which needs a ratio above SMALL_SLOPE^-2. With this
+ratio the same loops and targets reached 2.5, also with all kinds of filter. Only a target that leaves the beam is
 tested with it: the mean error of a block is above this share of `leaving_error` [-]. A filter that follows badly looks
 like this hypothesis when its target reverses.
 """
@@ -379,7 +381,7 @@ def _take_block(state: WrongSlope, t: Seconds, beam: Beam) -> None:
 
 @compiled
 def roughnesses(state: WrongSlope, hypothesis: int) -> tuple[float, float]:
-    """Return (J, J') of a hypothesis [-]; HYPOTHESIS_COUNT names them.
+    """Return (J, J') of a hypothesis [-]; HYPOTHESIS_COUNT names the hypotheses.
 
     A turn below 90 deg counts as one of 90 deg.
     """

@@ -48,13 +48,13 @@ is only noise, has no known attitude of the deck at its instant."""
 
 
 MAX_RISE_DB = 0.5
-"""Largest rise of the C/N0 from error to error that the filter believes [dB]. Errors are means, and after a fade they
+"""Largest rise of the C/N0 from error to error that the filter uses [dB]. Errors are means, and after a fade they
 hold the noise of the fade for longer than the published C/N0."""
 
 
 GATE_FLOOR_BEAMWIDTHS = 0.01
 """Standard deviation that the gate adds to every prediction [beamwidths]. With a strong signal the noise is so small
-that a target which begins to turn would leave the gate before the filter knows of it."""
+that a target which begins to turn would leave the gate before the filter follows it."""
 
 
 class Loop(NamedTuple):
@@ -265,7 +265,7 @@ def _distance(innovation: Innovation, measurement: Measurement, floor: Radians) 
     """Return nu' S^-1 nu of the two angles [-], with the variance floor^2 added to each S across the line of sight."""
     azimuth, elevation = innovation.axis
     added = floor * floor
-    stretch = measurement.axis[0].variance / measurement.axis[1].variance   # 1 / cos^2 of the elevation
+    stretch = measurement.axis[0].variance / measurement.axis[1].variance   # ashore 1 / cos^2 of the elevation
     return (azimuth.nu * azimuth.nu / (azimuth.S + added * stretch)
             + elevation.nu * elevation.nu / (elevation.S + added))
 

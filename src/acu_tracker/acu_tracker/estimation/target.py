@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 class Constants(Record):
     """Constants of the filter and of its gate."""
     filter: target_filter.Constants
-    # largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
+    # largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its
+    # covariance, of the angles with receiver_error.GATE_FLOOR_BEAMWIDTHS
     gates: Pair
 
 

@@ -285,7 +285,8 @@ def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
     The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
     innovations have the mean b. Above chance, b^2 is added to the variance of the angle, and in proportion to the
     others. The bank also expects more motion than a calm target makes, and the mean is then smaller than expected:
-    `calm` is its mean square over the expected one. Only this part of the variances is stated, times `doubt`.
+    `calm` is its mean square over the expected one. Only this part of the variances is stated, times `doubt`:
+    the factor by which the next model, as far as it is possible, has a larger variance.
 
     A target may also jump, or swing by less than the noise of a filter that would follow it. The bank is then right
     not to follow, and the mean of b over its memory is about 0. A short mean shows the jump, and its mean square the

@@ -181,8 +181,8 @@ def _with_cartesian(state: Filter, axes: Estimate) -> Estimate:
 
 @compiled
 def read_corrected(state: Filter, constants: Constants) -> Estimate:
-    """Return the Estimate at the last measurement, with the variances of the banks. Decisions use them, because what
-    the filter states must not change what it estimates."""
+    """Return the Estimate at the last measurement, with the variances of the banks. Convergence and the start of
+    the Cartesian filter use these, because the stated variances must not change the estimate."""
     if state.running:
         predict(state, constants, 0.0)
     return _with_cartesian(state, _of_banks(state))
