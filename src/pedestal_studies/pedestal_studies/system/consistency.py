@@ -47,8 +47,8 @@ MAX_NEES = 2.4  # largest NEES of a filter that is not too sure: 2 plus 20 %
 
 def gaps(found: Consistency, tracked: Tracking) -> Floats:
     """Return the time [s] at each step since the last error that came while the target was in the main lobe."""
-    heard = np.isfinite(found.innovation[:, 0]) & (tracked.distance <= 0.5 * tracked.beamwidth)
-    return found.t - np.maximum.accumulate(np.where(heard, found.t, -np.inf))
+    came = np.isfinite(found.innovation[:, 0]) & (tracked.distance <= 0.5 * tracked.beamwidth)
+    return found.t - np.maximum.accumulate(np.where(came, found.t, -np.inf))
 
 
 def of_second(time: float, after: Floats, values: Pairs, counted: Bools) -> Floats:
@@ -81,11 +81,11 @@ def _row(name: str, metric: str, values: Floats) -> Row:
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of values {case: (runs, len(TIMES_S), 2)}. A second that counts in less than half of the runs
-    has no row."""
+    """Return the rows of values {case: (runs, len(TIMES_S), 2)}. A second that counts in less than half of the runs,
+    or in a single run, has no row."""
     return [_row(name, f'nees_{axis}_{time:g}_s', of_runs[known, k, i])
             for name, of_runs in values.items() for k, time in enumerate(TIMES_S) for i, axis in enumerate(AXES)
-            if 2 * (known := np.isfinite(of_runs[:, k, i])).sum() >= len(known) > 1]
+            if 2 * (known := np.isfinite(of_runs[:, k, i])).sum() >= max(len(known), 4)]
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
