@@ -69,3 +69,17 @@ def test_two_departures_soon_after_the_lock_are_a_divergence_until_a_reset():
     assert not end(0.0, 5.0) and not end(6.0, 7.0, False) and end(8.0, 9.0)
     departure.release(one)
     assert not end(10.0, 11.0) and not end(12.0, 12.1 + departure.HOLD_TIME_S) and end(30.0, 31.0)
+    departure.release(one)
+    assert not end(40.0, 41.0) and not end(100.0, 41.1 + departure.SUCCESSION_TIME_S)
+
+
+def test_a_program_that_replaces_another_one_is_no_departure(Rig):
+    """In a fade the operator gives a program that begins 1.2 beamwidths off the target."""
+    rig = Rig(lambda t: (0.5, ELEVATION), at=(0.5, ELEVATION), initial_mode='program', sigma=SIGMA)
+    rig.program(target=rig.target)
+    rig.run(START, cn0_dbhz=CN0)
+    for k, drop in enumerate((*[1.0] * 5, *[2.2] * 5, *[4.0] * 40)):
+        if k == 8:
+            rig.program(target=lambda t: (0.5, ELEVATION + 1.2 * B))
+        rig.step(cn0_dbhz=CN0 - drop)
+    assert (rig.mode, rig.reason) == ('autotrack', 'locked')

@@ -101,6 +101,22 @@ def test_small_errors_with_the_wrong_sign_are_seen_while_the_beam_is_less_than_4
     assert monitors.score(state, 3, False) > 1.0 > max(monitors.score(state, h, False) for h in range(3))
 
 
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('cn0_dbhz', [26.0, 30.0])
+def test_the_lag_of_a_target_that_turns_in_a_fade_is_no_small_error(Rig, seed, cn0_dbhz):
+    """With the noise of the fade the filter is slow, and follows a target of 0.2 rad/s2 a tenth of the beamwidth
+    late. The receiver reports errors at each C/N0."""
+    def target(t):
+        return 0.5 + 0.1 * max(t - 4.0, 0.0)**2 / math.cos(0.6), 0.6
+    rig = Rig(target, at=(0.5, 0.6), initial_mode='program', sigma=SIGMA)
+    rig.rng = np.random.default_rng(seed)
+    rig.program(target=target)
+    rig.run(4.0, cn0_dbhz=46.0)
+    rig.sigma = SIGMA * 10.0**(0.05 * (46.0 - cn0_dbhz))
+    rig.run(3.0, cn0_dbhz=cn0_dbhz)
+    assert 'diverged' not in rig.reason
+
+
 def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_of_their_curve_or_none_at_all(state):
     """Errors that lead away from the first on: what they are is seen, and said from FIRST_VERDICT on."""
     way = 0.01 * np.exp(0.05 * np.arange(200))

@@ -7,13 +7,14 @@ receiver follows its level late, and makes the noise small. In this time the bea
 The level falls in a fade too. The two differ in what comes first, if the program was right before:
 
     o       offset: direction of the estimate less that of the program, ENU unit vectors
-    d       |o - o_f|, o_f: offset when the level began to fall, by FALL_DB below its recent maximum
+    d       |o - o_f|, o_f: offset when the level began to fall, by FALL_DB below its recent maximum. Both are offsets
+            from the present program, which may have replaced another one since
 
 A beam that leaves its target has moved before its level is low: in closed loops d was mostly 0.5 to 0.7 beamwidths at
 a drop of LOW_DB. In a fade the level comes first, and d was mostly below 0.3 beamwidths, also on targets that turned
 at that moment. If d is above MIN_FIRST_BEAMWIDTHS at this drop, autotrack ends as soon as d reaches MAX_BEAMWIDTHS.
 After MAX_COUNT such ends in succession the errors count as wrong (alarm `diverged`). Autotrack of more than
-HOLD_TIME_S begins a new succession, of which its own end is the first.
+HOLD_TIME_S begins a new succession, of which its own end is the first, and so does a time of SUCCESSION_TIME_S.
 
 A program that is further off than MAX_FALL_OFFSET_BEAMWIDTHS at the begin of the fall is no reference, such as the
 plan of an aircraft that flies another way. A level that falls already when autotrack begins shows nothing, because the
@@ -42,9 +43,11 @@ class Departure(Record):
     stamp: Seconds          # time of the last error
     level: DecibelHertz     # recent maximum of the C/N0
     drop: float             # level less the last C/N0 [dB]
-    offset: Vector3         # o_f [-]; NaN in x: no reference
+    fell: Seconds           # time at which the level began to fall; NaN: it has not, or shows nothing
+    sight: Vector3          # direction of the estimate at this time, ENU unit vector
     begun: Seconds          # begin of the mode
     count: int              # number of successive ends of autotrack by a departure
+    last: Seconds           # time of the last one
 
 
 FORGETTING_DB_PER_S = 6.0
@@ -64,28 +67,34 @@ MAX_FALL_OFFSET_BEAMWIDTHS = 3.0
 is already one beamwidth off."""
 
 HOLD_TIME_S = 10.0  # longest autotrack that continues a succession of departures [s]
+SUCCESSION_TIME_S = 60.0    # longest time between two departures of a succession [s]
 MAX_COUNT = 2       # number of successive departures that show wrong errors
 
 
 def initialise(record: Records) -> None:
     """Begin without a level."""
     record['stamp'] = record['level'] = -math.inf
-    record['offset'] = math.nan
+    record['fell'] = math.nan
 
 
 @compiled
 def restart(state: Departure, t: Seconds) -> None:
     """Note that a mode begins at t."""
-    state.begun, state.offset[0] = t, math.nan
+    state.begun, state.fell = t, math.nan
 
 
 @compiled
-def _offset(target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Vector:
-    """Return o at t, NaN without a program."""
+def _sight(target_: Target, constants: 'Constants', t: Seconds) -> Vector:
+    """Return the direction of the estimate at t."""
+    return frames.to_earth(target_.frame, target.outlook(target_, constants.target, t)).u
+
+
+@compiled
+def _offset(sight: Vector, program: ProgramTrack, t: Seconds) -> Vector:
+    """Return a direction less that of the program at t, NaN without a program."""
     if program_track.status(program, t) != Reason.NONE:
         return Vector(math.nan, math.nan, math.nan)
-    u = frames.to_earth(target_.frame, target.outlook(target_, constants.target, t)).u
-    return minus(u, line_of_sight(program_track.motion_at(program, t)).u)
+    return minus(sight, line_of_sight(program_track.motion_at(program, t)).u)
 
 
 @compiled
@@ -97,8 +106,8 @@ def _length(v: Vector) -> float:
 def in_coast(target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Radians:
     """Return how far the estimate has departed from the program since the last accepted measurement; 0 without a
     program at one of the two times, or if it was no reference before."""
-    before = _offset(target_, constants, program, target_.stamp)
-    gone = _length(minus(_offset(target_, constants, program, t), before))
+    before = _offset(_sight(target_, constants, target_.stamp), program, target_.stamp)
+    gone = _length(minus(_offset(_sight(target_, constants, t), program, t), before))
     reference = _length(before) <= MAX_OFFSET_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth
     return gone if reference and math.isfinite(gone) else 0.0
 
@@ -107,8 +116,9 @@ def in_coast(target_: Target, constants: 'Constants', program: ProgramTrack, t: 
 def _beyond(state: Departure, target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds,
             beamwidths: float) -> bool:
     """Return True if d is larger than a number of beamwidths at t; False without a reference or a program."""
-    gone = minus(_offset(target_, constants, program, t), vector(state.offset))
-    return _length(gone) > beamwidths * constants.p.tracker.receiver.beamwidth
+    beamwidth, before = constants.p.tracker.receiver.beamwidth, _offset(vector(state.sight), program, state.fell)
+    gone = minus(_offset(_sight(target_, constants, t), program, t), before)
+    return _length(before) <= MAX_FALL_OFFSET_BEAMWIDTHS * beamwidth and _length(gone) > beamwidths * beamwidth
 
 
 @compiled
@@ -121,29 +131,30 @@ def take_level(state: Departure, target_: Target, constants: 'Constants', progra
     # After a gap the estimate may be off because the target has turned.
     gap = max(T, stamp - target_.stamp) > constants.p.tracker.coast_after
     if gap or not closed or state.drop <= FALL_DB:
-        state.offset[0] = math.nan
+        state.fell = math.nan
     elif before <= FALL_DB:
-        offset = _offset(target_, constants, program, target_.stamp)
-        if _length(offset) <= MAX_FALL_OFFSET_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth:
-            state.offset[0], state.offset[1], state.offset[2] = offset
-    if before <= LOW_DB < state.drop and not _beyond(state, target_, constants, program, target_.stamp,
-                                                     MIN_FIRST_BEAMWIDTHS):
-        state.offset[0] = math.nan
+        state.fell = target_.stamp
+        state.sight[0], state.sight[1], state.sight[2] = _sight(target_, constants, target_.stamp)
+    if before <= LOW_DB < state.drop and not (math.isfinite(state.fell) and _beyond(
+            state, target_, constants, program, target_.stamp, MIN_FIRST_BEAMWIDTHS)):
+        state.fell = math.nan
 
 
 @compiled
 def departed(state: Departure, target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds) -> bool:
     """Return True if autotrack has departed from the program at t."""
-    return (state.drop > LOW_DB and math.isfinite(state.offset[0])
+    return (state.drop > LOW_DB and math.isfinite(state.fell)
             and _beyond(state, target_, constants, program, t, MAX_BEAMWIDTHS))
 
 
 @compiled
 def note_end(state: Departure, t: Seconds, by_departure: bool) -> bool:
     """Note that autotrack ends at t. Return True if the errors of the receiver are wrong."""
-    if t - state.begun > HOLD_TIME_S:
+    if t - state.begun > HOLD_TIME_S or t - state.last > SUCCESSION_TIME_S:
         state.count = 0
-    state.count += by_departure
+    if by_departure:
+        state.count += 1
+        state.last = t
     return state.count >= MAX_COUNT
 
 

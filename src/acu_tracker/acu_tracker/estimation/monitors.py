@@ -229,6 +229,7 @@ class WrongSlope(Record):
     error_square: Pair      # means of b_x^2, b_e^2 [-]
     product: Pair           # means of a_x b_x, a_e b_e [-]
     turn: float             # Im C: mean of a_x b_e - a_e b_x [-]
+    score: float            # largest score after the last block [-]
 
 
 BLOCK_ERROR_COUNT = 4
@@ -270,11 +271,14 @@ targets that reverse, with J = 5 J' and m of at least 2.8. With a wrong slope m 
 the filter follows the target that seems to flee.
 """
 
-SMALL_SLOPE_RATIO, SMALL_SLOPE_MARGIN, SMALL_SLOPE_EXPLAINED, SMALL_LEAVING_SHARE = 20.0, 6.0, 0.9, 0.4
-"""The first three limits for the hypothesis of SMALL_SLOPE [-], which needs a ratio above SMALL_SLOPE^-2. With this
-ratio the same loops and targets reached 2.5, also with all kinds of filter. Only a target that leaves the beam is
-tested with it: the mean error of a block is above this share of `leaving_error` [-]. A filter that follows badly looks
-like this hypothesis when its target reverses.
+SMALL_SLOPE_RATIO, SMALL_SLOPE_MARGIN, SMALL_SLOPE_EXPLAINED = 20.0, 6.0, 0.9
+"""The same limits for the hypothesis of SMALL_SLOPE [-], which needs a ratio above SMALL_SLOPE^-2. With this ratio the
+same loops and targets reached 2.5, also with all kinds of filter."""
+
+SMALL_LEAVING_SHARE, SMALL_LEAVING_SIGMAS = 0.4, 5.0
+"""Only a target that leaves the beam is tested with the hypothesis of SMALL_SLOPE: the mean error of a block is above
+this share of `leaving_error` [-], and above this number of its standard deviations. A filter that follows badly looks
+like the hypothesis when its target reverses, and so does each filter in the noise of a fade.
 """
 
 
@@ -319,7 +323,7 @@ def _clear_slope(state: WrongSlope) -> None:
     state.beam_square[:] = 0.0
     state.error_square[:] = 0.0
     state.product[:] = 0.0
-    state.turn = 0.0
+    state.turn = state.score = 0.0
 
 
 @compiled
@@ -414,14 +418,15 @@ def score(state: WrongSlope, hypothesis: int, leaves: bool) -> float:
 
 
 @compiled
-def largest_score(state: WrongSlope, leaving: Radians) -> float:
+def _largest_score(state: WrongSlope, leaving: Radians) -> float:
     """Return the largest score of all hypotheses after a full block, 0 before the first verdict; leaving: see
     leaving_error."""
     if state.n < MIN_BLOCK_COUNT:
         return 0.0
     x, y, z = state.sum[3], state.sum[4], state.sum[5]
     mean, largest = math.sqrt(x * x + y * y + z * z) / BLOCK_ERROR_COUNT, 0.0
-    for hypothesis in range(HYPOTHESIS_COUNT if mean > SMALL_LEAVING_SHARE * leaving else HYPOTHESIS_COUNT - 1):
+    leaves = mean > max(SMALL_LEAVING_SHARE * leaving, SMALL_LEAVING_SIGMAS * math.sqrt(mean_variance(state)))
+    for hypothesis in range(HYPOTHESIS_COUNT if leaves else HYPOTHESIS_COUNT - 1):
         largest = max(largest, score(state, hypothesis, mean > leaving))
     return largest
 
@@ -449,4 +454,5 @@ def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, 
     if not full(state):
         return False
     _take_block(state, t, beam)
-    return largest_score(state, leaving) > 1.0
+    state.score = _largest_score(state, leaving)
+    return state.score > 1.0

@@ -84,7 +84,7 @@ DURATIONS_S = {'phased_array_sway': 20.0}  # of scenarios that are shorter
 MAX_ALARM_STEPS = 200  # latest alarm, in steps after the onset
 FALSE_ALARM_FREE_STEPS = 10 * 3600 * 200  # 10 h
 LIMIT_FACTORS = (0.25, 0.5, 0.75, 1.0)  # of both limits; the last one is that of the alarm
-COARSE_STEPS, FINE_STEPS = 20, monitors.BLOCK_ERROR_COUNT  # steps between two looks at a right and at a gross slope
+LOOK_STEPS = monitors.BLOCK_ERROR_COUNT  # steps between two looks at a run
 COLUMN_COUNT = len(LIMIT_FACTORS) + 3  # numbers of a run of one case
 
 
@@ -99,10 +99,8 @@ def variant(target: str, seed: int) -> Variant:
 
 def reached(loop: Loop) -> tuple[float, float]:
     """Return the score and the sum of a loop, each divided by its limit; 0 before the first verdict."""
-    acu = loop.units['acu']
-    tracking, beamwidth = acu.parts['state']['tracking'], acu.parameters.tracker.receiver.beamwidth
-    curves, sums = tracking['wrong_slope'], tracking['slope_ratio']
-    score = monitors.largest_score(curves, monitors.leaving_error(tracking['divergence'], beamwidth))
+    tracking = loop.units['acu'].parts['state']['tracking']
+    score, sums = float(tracking['wrong_slope']['score']), tracking['slope_ratio']
     summed = sums['n'] >= slope_ratio.MIN_BLOCK_COUNT
     largest = (sums['S'] - slope_ratio.MISFIT_WEIGHT * np.maximum(sums['X'], 0.0)).max() if summed else 0.0
     return score, float(largest) / slope_ratio.MAX_S
@@ -150,7 +148,7 @@ def _quiet(loop: Loop, last: int) -> Floats:
 
     def watch(made: int) -> int:
         np.maximum(most, reached(loop), out=most)
-        return 0 if _alarmed(loop) else COARSE_STEPS
+        return 0 if _alarmed(loop) else LOOK_STEPS
     on = loop.run(watch=watch, last=last)['acu/mode'] == Mode.AUTOTRACK
     return np.array([_alarmed(loop), on.sum() * loop.period_ns / 3.6e12, *most])
 
@@ -160,12 +158,11 @@ def _after_onset(loop: Loop, name: str) -> Floats:
     known_steps, the largest error, and 1 if autotrack ends without the alarm, else 0."""
     loop.units['tracking_receiver'].command(Command('wrong_slope', arguments=SLOPES[name].arguments))
     onset, steps = loop.made, np.full(len(LIMIT_FACTORS), np.nan)
-    spacing = FINE_STEPS if name in GROSS_SLOPES else COARSE_STEPS
 
     def watch(made: int) -> int:
         share = math.inf if _alarmed(loop) else min(max(reached(loop)), LIMIT_FACTORS[-1])
         steps[np.isnan(steps) & (share > np.array(LIMIT_FACTORS))] = made - onset
-        return spacing if _tracks(loop) and not _alarmed(loop) else 0
+        return LOOK_STEPS if _tracks(loop) and not _alarmed(loop) else 0
     run = loop.run(watch=watch, last=onset + round(RUN_AFTER_ONSET_S * 1e9 / loop.period_ns))
     watch(loop.made)
     lost = not (_tracks(loop) or _alarmed(loop))
