@@ -83,7 +83,8 @@ def constants(params: AcuParameters) -> Records:
     made['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
                                                   params.reaction) for axis in axes])
     made['floor'] = travel.floor_table(params.floor)
-    made['target'] = target.constants(params.tracker, structure.filters(params))
+    made['target'] = target.constants(params.tracker, structure.filters(params),
+                                      all(axis.structure.inertia_share == 0.0 for axis in axes))
     made['lookahead'] = planner.constants(params)
     return made
 

@@ -179,7 +179,9 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
     tracking.initialise(state, params.pointing)
     measured, estimates = np.column_stack((azimuth, elevation)), np.empty((len(stamps), 2, len(COLUMNS)))
     outcomes = np.zeros(len(stamps), int)
-    take_each(state[0], control_unit.constants(params)[0], inputs[0], signals.Outputs.zeros()[0], stamps,
+    constants = control_unit.constants(params)
+    constants['target']['gate_floor'] = 0.0     # The angles of the caller have no beam.
+    take_each(state[0], constants[0], inputs[0], signals.Outputs.zeros()[0], stamps,
               np.radians(measured), cn0_of(np.radians(spread)), bridged, estimates, outcomes)
     estimates[:, :, :-1] = np.degrees(estimates[:, :, :-1])
     estimates[:, 0, 0] = np.unwrap(np.concatenate((azimuth[:1], estimates[:, 0, 0])), period=360.0)[1:]

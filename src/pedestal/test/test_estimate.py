@@ -40,17 +40,18 @@ def test_cv_is_filterpys_kalman_filter():
     for y in A[1:]:
         oracle.predict()
         oracle.update(y)
-        # The stated variances grow with the mean of the last innovations, for two thirds of the gain of the angle.
-        # They are smaller while its mean square over 20 s, or 7 / gain, is smaller than that of white innovations.
+        # The stated variances grow with the mean of the last innovations, for 0.4 of the gain of the angle. They are
+        # smaller while its mean square over 20 s, or 12 / gain, is smaller than that of white innovations.
         nu, S, K = oracle.y.item(), oracle.S.item(), oracle.K[0, 0]
-        trend, variance = trend + K / 1.5 * (nu - trend), (1.0 - K / 1.5)**2 * variance + (K / 1.5)**2 * S
-        calm += min(T / 20.0, K / 7.0) * (trend**2 / variance - calm)
+        trend, variance = trend + K / 2.5 * (nu - trend), (1.0 - K / 2.5)**2 * variance + (K / 2.5)**2 * S
+        calm += min(T / 20.0, K / 12.0) * (trend**2 / variance - calm)
         factor = min(max(calm, 0.5), 1.0) + 2.0 * max(trend**2 - 2.0 * variance, 0.0) / oracle.P[0, 0]
-        # They also grow with a mean of 0.1 s that is larger than the one of white innovations, for 20 s.
+        # They also grow with a mean of 0.1 s that is larger than the one of white innovations: at once if it is clear,
+        # and for 20 s.
         gain = T / 0.1
         short, white = short + gain * (nu - short), (1.0 - gain)**2 * white + (gain * nu)**2
         swing += T / 20.0 * (min(short**2, 40.0 * white) - 1.14 * white - swing)
-        more = max(swing, 0.0) * np.array([1.0, 100.0])
+        more = max(swing, short**2 - 5.0 * white, 0.0) * np.array([1.0, 400.0])
         expected.append((*oracle.x[:, 0], *np.sqrt(factor * np.diag(oracle.P) + more), nu**2 / S))
     for column, wanted in zip(('position', 'rate', 'position_sigma', 'rate_sigma', 'nis'), np.transpose(expected)):
         np.testing.assert_allclose(made[f'azimuth.{column}'][1:], wanted, rtol=2e-5, atol=1e-6, err_msg=column)

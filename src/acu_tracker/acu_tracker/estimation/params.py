@@ -168,8 +168,8 @@ class TrackerParameters(Parameters):
     """Target filter, its gates and the conditions of its lock."""
 
     gate: float = parameter(25.0, 1.0, 1e6, '', 'largest accepted square of the innovation of both angles over its '
-                            'variance, which has (0.01 beamwidths)^2 added; the filter ignores an error above it; '
-                            'rates and ranges have gates of the same probability')
+                            'variance, which has (0.01 beamwidths)^2 added on a rigid antenna; the filter ignores an '
+                            'error above it; rates and ranges have gates of the same probability')
     gate_restart: int = parameter(20, 1, 100000, '', 'number of consecutive gated errors at which the filter restarts')
     restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
     initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')

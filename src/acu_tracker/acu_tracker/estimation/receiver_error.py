@@ -52,11 +52,6 @@ MAX_RISE_DB = 0.5
 hold the noise of the fade for longer than the published C/N0."""
 
 
-GATE_FLOOR_BEAMWIDTHS = 0.01
-"""Standard deviation that the gate adds to every prediction [beamwidths]. With a strong signal the noise is so small
-that a target which begins to turn would leave the gate before the filter follows it."""
-
-
 class Loop(NamedTuple):
     """Conditions of the monitors. While a limit holds the beam off the target, both truth values are False."""
     closed: bool    # the loop is closed on the errors (autotrack)
@@ -237,7 +232,7 @@ def gate(state: Target, params: TrackerParameters, constants: target.Constants, 
         if innovation.range_nu * innovation.range_nu > constants.gates[1] * innovation.range_S:
             state.ranges_gated += 1
             measurement = Measurement(measurement.stamp, measurement.axis, math.nan, measurement.range_variance)
-        if _distance(innovation, measurement, GATE_FLOOR_BEAMWIDTHS * params.receiver.beamwidth) <= constants.gates[0]:
+        if _distance(innovation, measurement, constants.gate_floor) <= constants.gates[0]:
             measurement = _with_accepted_rates(state, params, constants, measurement, innovation)
             target_filter.correct(f, k, measurement)
             outcome = OUTCOME_ACCEPTED

@@ -19,19 +19,26 @@ from acu_tracker.geometry.attitude import DeckAttitude
 from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.vector import ZERO_VECTOR, Motion, Rotation, angles, earth_angles, line_of_sight
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Bit, Ints, Pair, Records, Seconds
+from pedestal_common.quantities import Bit, Ints, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.params import SharedParameters
 
 
+GATE_FLOOR_BEAMWIDTHS = 0.01
+"""Standard deviation that the gate adds to every prediction on a rigid antenna [beamwidths]. With a strong signal the
+noise is so small that a target which begins to turn would leave the gate before the filter follows it. A dish that
+swings would pass too, and its filter does not follow a swing."""
+
+
 class Constants(Record):
     """Constants of the filter and of its gate."""
     filter: target_filter.Constants
     # largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its
-    # covariance, of the angles with receiver_error.GATE_FLOOR_BEAMWIDTHS
+    # covariance, of the angles with gate_floor
     gates: Pair
+    gate_floor: Radians     # standard deviation that the gate adds to every predicted angle
 
 
 class Target(Record):
@@ -76,10 +83,12 @@ def gate_of_one(gate: float) -> float:
     return high
 
 
-def constants(params: TrackerParameters, axes: Sequence[FilterParameters]) -> Records:
-    """Return the constants (1,) of the parameters, and of the filters of both axes."""
+def constants(params: TrackerParameters, axes: Sequence[FilterParameters], rigid: bool = True) -> Records:
+    """Return the constants (1,) of the parameters, and of the filters of both axes; rigid: True if neither axis has a
+    structure that swings."""
     return Constants.of(filter=target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth),
-                        gates=(params.gate, gate_of_one(params.gate)))
+                        gates=(params.gate, gate_of_one(params.gate)),
+                        gate_floor=GATE_FLOOR_BEAMWIDTHS * params.receiver.beamwidth if rigid else 0.0)
 
 
 def initialise(record: Records) -> None:

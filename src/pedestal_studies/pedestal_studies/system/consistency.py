@@ -81,11 +81,11 @@ def _row(name: str, metric: str, values: Floats) -> Row:
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of values {case: (runs, len(TIMES_S), 2)}. A second that counts in less than half of the runs,
-    or in a single run, has no row."""
+    """Return the rows of values {case: (runs, len(TIMES_S), 2)}. A second that counts in less than three quarters of
+    the runs, or in a single run, has no row."""
     return [_row(name, f'nees_{axis}_{time:g}_s', of_runs[known, k, i])
             for name, of_runs in values.items() for k, time in enumerate(TIMES_S) for i, axis in enumerate(AXES)
-            if 2 * (known := np.isfinite(of_runs[:, k, i])).sum() >= max(len(known), 4)]
+            if 4 * (known := np.isfinite(of_runs[:, k, i])).sum() >= max(3 * len(known), 8)]
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
