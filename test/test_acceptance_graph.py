@@ -122,6 +122,7 @@ def test_a_killed_run_is_a_stop_and_no_wait_for_ever(domain, tmp_path):
             graph.perform('killed', step(duration=600.0), 1)
 
 
+@pytest.mark.thorough
 def test_an_antenna_outside_of_its_envelope_is_stopped(domain, tmp_path):
     narrow = dataclasses.replace(step(duration=30.0), envelope=(Span(-1.0, 0.5, 40.0), SPAN))
     outside = 'azimuth 0.5.* deg: outside its envelope, -1.000 to 0.500 deg'

@@ -411,12 +411,13 @@ def _supervise(state: State, constants: Constants, inputs: Inputs, outputs: Outp
     ship = deck.stabilised != 0 and deck.history.count > 0
     # signal_lost: autotrack has no signal, and no hidden sector, keyhole or turn explains this.
     unexplained = outputs.coasting != 0 and not _outage(state, constants).permitted
-    lost = state.mode.reason == Reason.SIGNAL_LOST or state.mode.reason == Reason.DEPARTED
+    ended = state.mode.reason == Reason.SIGNAL_LOST or state.mode.reason == Reason.DEPARTED
+    signal_lost = unexplained or ended
     attitude_known, _ = attitude.at(deck, params, state.stamp + constants.lead)
     facts = conditions.Facts(
         dt=0.0 if jumped else dt, gap=dt if jumped else 0.0, lost=dt > 1.5 * params.period, latched=latched(state),
         attitude_lost=ship and not attitude_known, attitude_jumped=ship and deck.jump.apart != 0,
-        signal_lost=lost or unexplained, unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
+        signal_lost=signal_lost, unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
     rests = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now)
     mode = Mode.STANDBY if rests else state.mode.now
     conditions.take(state.supervision, mode, inputs, outputs, constants.axis, state.unasked, facts)

@@ -6,7 +6,7 @@ from acu_tracker import signals
 from acu_tracker.estimation import departure, monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, frames, history
-from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
+from acu_tracker.geometry.vector import ZERO_VECTOR, Vector, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
@@ -158,12 +158,6 @@ def leaves_beam(sigma: Radians, departed: Radians, beamwidth: Radians) -> bool:
     """Return True if a coast has become useless: sigma of the estimate is above half a beamwidth, or the estimate has
     departed from the program by more than departure.MAX_OFFSET_BEAMWIDTHS."""
     return sigma > 0.5 * beamwidth or departed > departure.MAX_OFFSET_BEAMWIDTHS * beamwidth
-
-
-@compiled
-def sight(tracking: Tracking, constants: 'Constants', t: Seconds) -> LineOfSight:
-    """Return the line of sight (ENU) of the estimate at t."""
-    return frames.to_earth(tracking.target.frame, target.outlook(tracking.target, constants.target, t))
 
 
 @compiled

@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING
 
 from acu_tracker.estimation import target
 from acu_tracker.estimation.target import Target
-from acu_tracker.geometry import frames
 from acu_tracker.geometry.vector import Vector, dot, line_of_sight, minus, vector
 from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
@@ -84,12 +83,6 @@ def restart(state: Departure, t: Seconds) -> None:
 
 
 @compiled
-def _sight(target_: Target, constants: 'Constants', t: Seconds) -> Vector:
-    """Return the direction of the estimate at t."""
-    return frames.to_earth(target_.frame, target.outlook(target_, constants.target, t)).u
-
-
-@compiled
 def _offset(sight: Vector, program: ProgramTrack, t: Seconds) -> Vector:
     """Return a direction less that of the program at t, NaN without a program."""
     if program_track.status(program, t) != Reason.NONE:
@@ -106,8 +99,8 @@ def _length(v: Vector) -> float:
 def in_coast(target_: Target, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Radians:
     """Return how far the estimate has departed from the program since the last accepted measurement; 0 without a
     program at one of the two times, or if it was no reference before."""
-    before = _offset(_sight(target_, constants, target_.stamp), program, target_.stamp)
-    gone = _length(minus(_offset(_sight(target_, constants, t), program, t), before))
+    before = _offset(target.sight(target_, constants.target, target_.stamp).u, program, target_.stamp)
+    gone = _length(minus(_offset(target.sight(target_, constants.target, t).u, program, t), before))
     reference = _length(before) <= MAX_OFFSET_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth
     return gone if reference and math.isfinite(gone) else 0.0
 
@@ -117,7 +110,7 @@ def _beyond(state: Departure, target_: Target, constants: 'Constants', program: 
             beamwidths: float) -> bool:
     """Return True if d is larger than a number of beamwidths at t; False without a reference or a program."""
     beamwidth, before = constants.p.tracker.receiver.beamwidth, _offset(vector(state.sight), program, state.fell)
-    gone = minus(_offset(_sight(target_, constants, t), program, t), before)
+    gone = minus(_offset(target.sight(target_, constants.target, t).u, program, t), before)
     return _length(before) <= MAX_FALL_OFFSET_BEAMWIDTHS * beamwidth and _length(gone) > beamwidths * beamwidth
 
 
@@ -134,7 +127,8 @@ def take_level(state: Departure, target_: Target, constants: 'Constants', progra
         state.fell = math.nan
     elif before <= FALL_DB:
         state.fell = target_.stamp
-        state.sight[0], state.sight[1], state.sight[2] = _sight(target_, constants, target_.stamp)
+        state.sight[0], state.sight[1], state.sight[2] = target.sight(
+            target_, constants.target, target_.stamp).u
     if before <= LOW_DB < state.drop and not (math.isfinite(state.fell) and _beyond(
             state, target_, constants, program, target_.stamp, MIN_FIRST_BEAMWIDTHS)):
         state.fell = math.nan

@@ -323,14 +323,13 @@ def _follow_with_frame(state: Target, constants: target.Constants) -> None:
 def _watch_slope(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: Pointing,
                  mat_ed: Rotation, program: ProgramTrack) -> None:
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
-    params, azimuth, elevation = constants.p.tracker, constants.axis[0].p, constants.axis[1].p
-    rigid = azimuth.structure.inertia_share == 0.0 and elevation.structure.inertia_share == 0.0
+    params = constants.p.tracker
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
     leaving = monitors.leaving_error(tracking.divergence, params.receiver.beamwidth)
     wrong = monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
                                 params.coast_after, leaving)
-    if params.keeps_program and rigid and monitors.full(tracking.wrong_slope):
+    if params.keeps_program and constants.target.rigid and monitors.full(tracking.wrong_slope):
         walk = 0.0
         if tracking.attitude.stabilised:
             _, (tilt, heading) = attitude.expected_error(tracking.attitude.error, params.attitude)

@@ -17,7 +17,15 @@ from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry import attitude, frames, lever_arm
 from acu_tracker.geometry.attitude import DeckAttitude
 from acu_tracker.geometry.frames import Attitude
-from acu_tracker.geometry.vector import ZERO_VECTOR, Motion, Rotation, angles, earth_angles, line_of_sight
+from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
+    LineOfSight,
+    Motion,
+    Rotation,
+    angles,
+    earth_angles,
+    line_of_sight,
+)
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Ints, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
@@ -39,6 +47,7 @@ class Constants(Record):
     # covariance, of the angles with gate_floor
     gates: Pair
     gate_floor: Radians     # standard deviation that the gate adds to every predicted angle
+    rigid: Bit              # 1 if neither axis has a structure that swings
 
 
 class Target(Record):
@@ -88,7 +97,7 @@ def constants(params: TrackerParameters, axes: Sequence[FilterParameters], rigid
     structure that swings."""
     return Constants.of(filter=target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth),
                         gates=(params.gate, gate_of_one(params.gate)),
-                        gate_floor=GATE_FLOOR_BEAMWIDTHS * params.receiver.beamwidth if rigid else 0.0)
+                        gate_floor=GATE_FLOOR_BEAMWIDTHS * params.receiver.beamwidth if rigid else 0.0, rigid=rigid)
 
 
 def initialise(record: Records) -> None:
@@ -126,6 +135,12 @@ def outlook(target: Target, constants: Constants, t: Seconds) -> Motion:
     """Return the Motion in the frame of the filter predicted for t, at the earliest for the last accepted
     measurement."""
     return target_filter.outlook(target.filter, constants.filter, max(t - target.stamp, 0.0))
+
+
+@compiled
+def sight(target: Target, constants: Constants, t: Seconds) -> LineOfSight:
+    """Return the line of sight (ENU) of the estimate at t; t as in `outlook`."""
+    return frames.to_earth(target.frame, outlook(target, constants, t))
 
 
 @compiled

@@ -236,7 +236,7 @@ def held(guidance: Guidance, constants: 'Constants', t: Seconds) -> bool:
 def bridge_to(guidance: Guidance, tracking: Tracking, constants: 'Constants', program: ProgramTrack,
               t: Seconds) -> None:
     """Rotate the program so that it passes through the estimate at t. This avoids a jump of the antenna."""
-    bridge.begin(guidance.bridge, program, t, target_tracking.sight(tracking, constants, t).u)
+    bridge.begin(guidance.bridge, program, t, target.sight(tracking.target, constants.target, t).u)
 
 
 @compiled
@@ -249,7 +249,7 @@ def begin_by_level(guidance: Guidance, tracking: Tracking, constants: 'Constants
     """
     tracked = before == Mode.AUTOTRACK
     if tracked:
-        sight = target_tracking.sight(tracking, constants, t)
+        sight = target.sight(tracking.target, constants.target, t)
         acquisition.remember(guidance.acquisition, t, sight.u, sight.du)
     elif not modes.USES_SIGNAL_LEVEL[before]:
         u, du = target_tracking.beam(tracking, constants, t)
@@ -311,5 +311,5 @@ def _plan(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: 
         planner.look_along_program(lookahead, constants.lookahead, terms, t, azimuth, way)
         return
     sight = (line_of_sight(acquisition.expected(guidance.acquisition, way, t))
-             if modes.USES_SIGNAL_LEVEL[mode] else target_tracking.sight(tracking, constants, t))
+             if modes.USES_SIGNAL_LEVEL[mode] else target.sight(tracking.target, constants.target, t))
     planner.look_along_great_circle(lookahead, constants.lookahead, terms, t, azimuth, sight.u, sight.du)
